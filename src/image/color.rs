@@ -1,0 +1,1 @@
+//! sRGB, linear light and CIE L*a*b* (D65).

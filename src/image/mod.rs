@@ -1,0 +1,8 @@
+//! Room 1: what a picture is, where its pixels come from, and how it is read and written.
+
+pub mod color;
+pub mod io;
+pub mod mask;
+pub mod material;
+pub mod picture;
+pub mod sourcemap;

@@ -1,0 +1,34 @@
+//! texforge turns photographs into textures that can be used.
+//!
+//! One verb so far: [`tile`] makes a stationary tile from a casual photo, as a [`Tile`]: the
+//! picture, and the [`SourceMap`] that says which photo pixel each of its pixels is.
+//!
+//! ```
+//! use texforge::{Ctx, Encoding, Picture, Samples, TileParams, tile};
+//!
+//! let texels = (0..96 * 96).map(|i| ((i * 7919) % 251) as u8).collect();
+//! let photo = Picture::new(96, 96, 1, Samples::U8(texels), Encoding::Srgb)?;
+//! let params = TileParams { size: texforge::Size::Pixels { width: 64, height: 48 }, ..Default::default() };
+//! let tile = tile(&Ctx::new(0, 1)?, &photo, None, &params)?;
+//! assert_eq!((tile.picture.height(), tile.picture.width()), (48, 64));
+//! # Ok::<(), texforge::Error>(())
+//! ```
+
+pub mod analyze;
+pub mod base;
+pub mod cli;
+pub mod image;
+pub mod method;
+#[cfg(feature = "python")]
+mod python;
+pub mod search;
+pub mod signal;
+pub mod verb;
+
+pub use base::ctx::{Ctx, Job, Simd};
+pub use base::error::{Error, ErrorKind, Result};
+pub use image::mask::Mask;
+pub use image::material::MapKind;
+pub use image::picture::{Encoding, Picture, Samples};
+pub use image::sourcemap::SourceMap;
+pub use verb::tile::{Axis, Costs, Measure, Method, Quality, Report, Size, Tile, TileParams, tile};

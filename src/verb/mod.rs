@@ -1,0 +1,3 @@
+//! Room 7: the public functions, one file each. They pick methods, combine them and report.
+
+pub mod tile;
