@@ -7,6 +7,7 @@ use clap::{Arg, ArgAction, ArgMatches, Command, ValueHint, value_parser};
 
 use crate::base::error::Result;
 use crate::base::params::Param;
+use crate::cli::maps;
 use crate::verb::tile::TileParams;
 
 const TILE_EXAMPLES: &str = "\
@@ -105,11 +106,12 @@ fn tile() -> Command {
                 .value_name("NAME=FILE")
                 .action(ArgAction::Append)
                 .value_parser(ValueParser::os_string())
-                .help(
-                    "A further map of the same surface (normal, roughness, height, ...) that follows \
-                     the tile pixel by pixel; may be repeated. Maps whose file name is the photo's \
-                     with a usual suffix are taken by themselves",
-                ),
+                .help(format!(
+                    "A further map of the same surface that follows the tile pixel by pixel; may be \
+                     repeated. NAME is one of {}. Maps whose file name is the photo's with such an \
+                     ending are taken by themselves",
+                    maps::known_names()
+                )),
         )
         .arg(switch("no-maps", "Leave alone the maps that lie beside the photo"))
         .next_help_heading("Outputs")

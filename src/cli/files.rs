@@ -38,11 +38,18 @@ pub(super) fn encode(
     })
 }
 
-/// Fails if the format that `path` names cannot hold pictures like this one; one pixel is tried.
+/// Fails if the format that `path` names cannot hold pictures made of this one's pixels.
+///
+/// One pixel is tried, or all where the values decide as well as the type: floats that go where
+/// only 0 to 1 is held.
 ///
 /// # Errors
 /// [`Error::Format`].
 pub(super) fn ensure_can_hold(picture: &Picture, path: Option<&Path>, kind: MapKind) -> Result<()> {
+    let format = path.map_or(Some(Format::Png), Format::from_extension);
+    if picture.samples().is_float() && !matches!(format, Some(Format::Exr | Format::Tiff)) {
+        return encode(picture, path, kind, None).map(|_| ());
+    }
     let c = picture.channels();
     let pixel = with_samples!(picture.samples(), v => wrap(v[..c].to_vec()));
     encode(&picture.with_samples(1, 1, c, pixel)?, path, kind, None).map(|_| ())

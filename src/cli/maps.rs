@@ -34,8 +34,7 @@ pub(super) fn typed<'a>(specs: impl Iterator<Item = &'a OsString>) -> Result<Vec
             return Err(Error::parameter("map", "NAME=FILE, e.g. normal=brick_nrm.png", shown()));
         };
         let Some(MapName { name, kind, .. }) = files::map_of_name(&name) else {
-            let known: Vec<_> = MapName::ALL.iter().map(|map| map.name).collect();
-            let expected = format!("NAME=FILE where NAME is one of {}", known.join(", "));
+            let expected = format!("NAME=FILE where NAME is one of {}", known_names());
             return Err(Error::parameter("map", expected, shown()));
         };
         if maps.iter().any(|m| m.name == name) {
@@ -45,6 +44,11 @@ pub(super) fn typed<'a>(specs: impl Iterator<Item = &'a OsString>) -> Result<Vec
         maps.push(Wanted { name, path, kind, found: false });
     }
     Ok(maps)
+}
+
+/// The names that maps go by, for messages.
+pub(super) fn known_names() -> String {
+    MapName::ALL.map(|map| map.name).join(", ")
 }
 
 /// Splits at the first `=`; both sides must hold something.

@@ -214,6 +214,23 @@ mod tests {
     }
 
     #[test]
+    #[cfg(unix)]
+    fn replacing_keeps_links_and_permissions() {
+        use std::os::unix::fs::PermissionsExt as _;
+        let folder = tempfile::tempdir().expect("folder");
+        let session = Session::new(Arc::default(), true);
+        let [file, link] = ["file", "link"].map(|n| folder.path().join(n));
+        std::fs::write(&file, b"old").expect("file");
+        std::fs::set_permissions(&file, Permissions::from_mode(0o640)).expect("chmod");
+        std::os::unix::fs::symlink(&file, &link).expect("link");
+        session.staging.stage(&session, &link, b"new").expect("stage");
+        session.staging.commit(&session, true).expect("commit");
+        assert!(link.symlink_metadata().expect("link").is_symlink());
+        assert_eq!(std::fs::read(&file).expect("file"), b"new");
+        assert_eq!(file.metadata().expect("file").permissions().mode() & 0o777, 0o640);
+    }
+
+    #[test]
     fn abandoned_files_vanish_and_stay_away() {
         let folder = tempfile::tempdir().expect("folder");
         let session = Session::new(Arc::default(), true);

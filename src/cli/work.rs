@@ -14,8 +14,9 @@ use crate::cli::show::Console;
 /// How often the watching thread looks up.
 const POLL: Duration = Duration::from_millis(20);
 /// How long the worker may take to stop by itself. Together with two polls it must stay below the
-/// quarter of a second that is promised; decoders know no cancel point and run into it.
-const GRACE: Duration = Duration::from_millis(160);
+/// quarter of a second that is promised, with room for a busy machine. Decoders and encoders know
+/// no cancel point and run into it.
+const GRACE: Duration = Duration::from_millis(120);
 
 /// Signals seen since the run began. Signal handlers belong to the process, so does this.
 static SIGNALS: AtomicUsize = AtomicUsize::new(0);

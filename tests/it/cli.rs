@@ -276,6 +276,19 @@ mod refusal {
     }
 
     #[test]
+    fn values_that_the_format_cannot_hold_are_refused_before_the_work() {
+        let folder = Folder::new();
+        exr::prelude::write_rgb_file(folder.at("hdr.exr"), 96, 96, |x, y| {
+            (if (x, y) == (90, 90) { 7.5 } else { 0.5 }, 0.5, 0.25)
+        })
+        .expect("EXR");
+        // So large that the test would time out if it were tried.
+        let args = ["tile", "hdr.exr", "-o", "tile.png", "--size", "8192", "--quality", "best"];
+        folder.refuses(&args, 1, "7.5");
+        folder.refuses(&["tile", "hdr.exr", "-o", "tile.jpg", "--size", "48"], 1, "tile.jpg");
+    }
+
+    #[test]
     fn a_photo_smaller_than_the_patch() {
         let folder = Folder::new();
         folder.rgb("photo.png", 8, 8, 1);
