@@ -182,6 +182,7 @@ mod success {
         folder.does(&quick(&[]));
         let v = json(&folder, &["info", "tile.png", "--json"]);
         assert_eq!((&v["width"], &v["type"]), (&48.into(), &"uint8".into()));
+        assert_eq!(v["record"]["params"]["size"], "48x48", "how it was made: {v}");
     }
 }
 
