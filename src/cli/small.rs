@@ -128,7 +128,8 @@ pub(super) fn man(matches: &ArgMatches) -> Result<()> {
     if let Some(verb) = matches.get_one::<String>("verb") {
         command.build();
         if let Some(sub) = command.find_subcommand(verb) {
-            command = sub.clone().display_name(format!("texforge-{verb}"));
+            let version = env!("CARGO_PKG_VERSION");
+            command = sub.clone().display_name(format!("texforge-{verb}")).version(version);
         }
     }
     let mut text = Vec::new();
