@@ -314,4 +314,6 @@ fn unnamed() -> PathBuf {
 }
 
 #[cfg(test)]
+mod color_tests;
+#[cfg(test)]
 mod tests;
