@@ -1,3 +1,7 @@
-//! Integration tests, one binary.
+//! The one integration test binary; a module per subject.
 
+mod cli;
+mod house;
 mod io;
+#[path = "../support/mod.rs"]
+mod support;
