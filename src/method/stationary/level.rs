@@ -15,7 +15,7 @@ use crate::signal::resample::{resized, resized_mask};
 const RATIO: f64 = 1.3;
 
 /// Shorter side of the coarsest level, at least (the paper's).
-const COARSEST: f64 = 64.0;
+const COARSEST: f64 = 48.0;
 
 /// Window of the exemplar's typical histogram, as a fraction of its shorter side. Smaller than the
 /// texture's own features, it would call their colours untypical; larger than the stains' distances,
