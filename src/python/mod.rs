@@ -1,1 +1,169 @@
-//! The Python face.
+//! The Python face: the private module `texforge._texforge`, a handful of functions.
+//!
+//! It converts, enters the core through one doorway ([`enter`]) and maps errors. Names, defaults
+//! and documentation for people are in `python/texforge/_api.py`. No algorithm is in either.
+
+mod array;
+mod enter;
+mod error;
+
+use std::ffi::OsString;
+
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::base::ctx::{Ctx, Job};
+use crate::base::error::{Error, ErrorKind, Result};
+use crate::image::mask::Mask;
+use crate::image::material::MapKind;
+use crate::image::picture::Picture;
+use crate::image::sourcemap::SourceMap;
+use crate::verb::tile::TileParams;
+use array::{ArrayIn, ArrayOut, MapIn, MapOut, array_out, map_out};
+use error::IntoPy;
+
+/// A picture of another map of the material: name, picture, what its numbers are.
+type NamedMap<'py> = (String, ArrayIn<'py>, String);
+
+fn map_kind(name: &str) -> Result<MapKind> {
+    match name {
+        "color" => Ok(MapKind::Color),
+        "data" => Ok(MapKind::Data),
+        "normal" => Ok(MapKind::Normal),
+        _ => Err(Error::parameter("kind", "one of color, data, normal", format!("`{name}`"))),
+    }
+}
+
+/// Fails before the long work if `map` could not be gathered after it.
+fn ensure_same_shape(name: &str, map: &Picture, photo: &Picture) -> Result<()> {
+    let probe = SourceMap::new((1, 1), (photo.height(), photo.width()), vec![[0, 0]])?;
+    match probe.apply(map, MapKind::Data) {
+        Err(Error::SizeMismatch { got_w, got_h, want_w, want_h, remedy, .. }) => {
+            let what = format!("the map `{name}`");
+            Err(Error::SizeMismatch { what, got_w, got_h, want_w, want_h, remedy })
+        }
+        other => other.map(drop),
+    }
+}
+
+/// Makes a tile. Returns the picture, the source map, the gathered maps and the report as JSON.
+#[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "one private caller, in _api.py, passes them by name")]
+#[expect(clippy::type_complexity, reason = "one private caller, in _api.py, names its parts")]
+#[pyo3(signature = (*, photo, mask, maps, params, seed, threads, progress))]
+fn tile<'py>(
+    py: Python<'py>,
+    photo: ArrayIn<'py>,
+    mask: Option<ArrayIn<'py>>,
+    maps: Vec<NamedMap<'py>>,
+    params: Vec<(String, String)>,
+    seed: u64,
+    threads: usize,
+    progress: Option<Bound<'py, PyAny>>,
+) -> PyResult<(ArrayOut<'py>, Option<MapOut<'py>>, Vec<(String, ArrayOut<'py>)>, String)> {
+    let mut settings = TileParams::default();
+    for (name, text) in &params {
+        settings.set(name, text).into_py(py)?;
+    }
+    settings.validate().into_py(py)?;
+    let photo = photo.picture(py)?;
+    let mask = match mask {
+        Some(mask) => Some(Mask::from_picture(&mask.picture(py)?).into_py(py)?),
+        None => None,
+    };
+    let mut others = Vec::with_capacity(maps.len());
+    for (name, map, kind) in &maps {
+        let map = map.picture(py)?;
+        ensure_same_shape(name, &map, &photo).into_py(py)?;
+        others.push((name.clone(), map, map_kind(kind).into_py(py)?));
+    }
+    let ctx = Ctx::new(seed, threads).into_py(py)?;
+    let job = ctx.job();
+    let (tile, gathered) = enter::enter(py, &job, progress.as_ref(), move || {
+        let tile = crate::verb::tile::tile(&ctx, &photo, mask.as_ref(), &settings)?;
+        let mut gathered = Vec::with_capacity(others.len());
+        if let Some(source_map) = &tile.source_map {
+            for (name, map, kind) in others {
+                gathered.push((name, source_map.apply(&map, kind)?));
+            }
+        }
+        Ok((tile, gathered))
+    })?;
+    let report = serde_json::to_string(&tile.report)
+        .map_err(|e| Error::Internal { message: e.to_string() })
+        .into_py(py)?;
+    let source_map = tile.source_map.as_ref().map(|map| map_out(py, map)).transpose()?;
+    let maps = gathered
+        .into_iter()
+        .map(|(name, picture)| Ok((name, array_out(py, &picture)?)))
+        .collect::<PyResult<_>>()?;
+    Ok((array_out(py, &tile.picture)?, source_map, maps, report))
+}
+
+/// Gathers a map through a source map.
+#[pyfunction]
+#[pyo3(signature = (*, source_map, map, kind))]
+fn apply<'py>(
+    py: Python<'py>,
+    source_map: MapIn<'py>,
+    map: ArrayIn<'py>,
+    kind: &str,
+) -> PyResult<ArrayOut<'py>> {
+    let kind = map_kind(kind).into_py(py)?;
+    let source_map = source_map.source_map(py)?;
+    let map = map.picture(py)?;
+    let job = std::sync::Arc::<Job>::default();
+    let out = enter::enter(py, &job, None, move || source_map.apply(&map, kind))?;
+    array_out(py, &out)
+}
+
+/// Every parameter of `tile`, with its default as text.
+#[pyfunction]
+fn schema(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
+    let entry = |param: crate::base::params::Param| {
+        let dict = PyDict::new(py);
+        dict.set_item("name", param.name)?;
+        dict.set_item("kind", param.kind)?;
+        dict.set_item("choices", param.choices)?;
+        dict.set_item("default", param.default)?;
+        dict.set_item("range", param.range)?;
+        dict.set_item("unit", param.unit)?;
+        dict.set_item("doc", param.doc)?;
+        Ok(dict)
+    };
+    TileParams::schema().into_iter().map(entry).collect()
+}
+
+/// The slug of every kind of error.
+#[pyfunction]
+fn error_kinds() -> Vec<&'static str> {
+    ErrorKind::ALL.into_iter().map(ErrorKind::slug).collect()
+}
+
+/// Fails inside the doorway with an error of this kind (`internal`: panics); for the tests.
+#[pyfunction]
+fn fail(py: Python<'_>, kind: String) -> PyResult<()> {
+    let job = std::sync::Arc::<Job>::default();
+    enter::enter(py, &job, None, move || error::example(&kind))
+}
+
+/// Runs the command line; returns the exit status.
+#[pyfunction]
+fn cli_main(py: Python<'_>, args: Vec<OsString>) -> u8 {
+    // The panic's message is on stderr already.
+    py.detach(|| std::panic::catch_unwind(|| crate::cli::run(args)).unwrap_or(1))
+}
+
+/// The private module.
+#[pymodule(gil_used = false)]
+mod _texforge {
+    #[pymodule_export]
+    use super::{apply, cli_main, error_kinds, fail, schema, tile};
+
+    use pyo3::prelude::*;
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}

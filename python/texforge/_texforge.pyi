@@ -1,0 +1,27 @@
+"""The compiled module. Private: `_api.py` is its only caller."""
+
+from collections.abc import Callable
+from typing import Any
+
+_Picture = tuple[Any, str, tuple[int, int, int], str]
+_PictureOut = tuple[bytearray, str, tuple[int, int, int], str]
+_Map = tuple[Any, tuple[int, int], tuple[int, int]]
+_MapOut = tuple[bytearray, tuple[int, int], tuple[int, int]]
+
+__version__: str
+
+def tile(
+    *,
+    photo: _Picture,
+    mask: _Picture | None,
+    maps: list[tuple[str, _Picture, str]],
+    params: list[tuple[str, str]],
+    seed: int,
+    threads: int,
+    progress: Callable[[float], object] | None,
+) -> tuple[_PictureOut, _MapOut | None, list[tuple[str, _PictureOut]], str]: ...
+def apply(*, source_map: _Map, map: _Picture, kind: str) -> _PictureOut: ...
+def schema() -> list[dict[str, Any]]: ...
+def error_kinds() -> list[str]: ...
+def fail(kind: str) -> None: ...
+def cli_main(args: list[str]) -> int: ...
