@@ -18,7 +18,7 @@ def main() -> int:
     if threading.current_thread() is not threading.main_thread():
         return _texforge.cli_main(sys.argv)
     # Python only notes Ctrl-C and raises later, in code that does not run meanwhile. With the
-    # system's own answer in place, the Rust side installs its handler as in the stand-alone program.
+    # system's own answer in place, the Rust side installs its handler as in the other program.
     try:
         before = signal.signal(signal.SIGINT, signal.SIG_DFL)
     except KeyboardInterrupt:

@@ -48,10 +48,6 @@ class TexforgeError(Exception):
         self.message = message
         self.kind = kind or self.default_kind
         self.fields = dict(fields or {})
-        if isinstance(self, OSError):
-            self.errno = self.fields.get("errno")
-            path = self.fields.get("path")
-            self.filename = None if path is None else str(path)
 
     def __str__(self) -> str:
         """Return the message."""
@@ -84,6 +80,14 @@ class FileError(TexforgeError, OSError):
     """A file cannot be read or written."""
 
     default_kind = "io"
+
+    def __init__(
+        self, message: str, *, kind: str | None = None, fields: dict[str, Any] | None = None
+    ) -> None:
+        super().__init__(message, kind=kind, fields=fields)
+        self.errno = self.fields.get("errno")
+        path = self.fields.get("path")
+        self.filename = None if path is None else str(path)
 
 
 class MissingFileError(FileError, FileNotFoundError):

@@ -25,7 +25,7 @@ use error::IntoPy;
 /// A picture of another map of the material: name, picture, what its numbers are.
 type NamedMap<'py> = (String, ArrayIn<'py>, String);
 
-fn map_kind(name: &str) -> Result<MapKind> {
+fn kind_named(name: &str) -> Result<MapKind> {
     match name {
         "color" => Ok(MapKind::Color),
         "data" => Ok(MapKind::Data),
@@ -75,7 +75,7 @@ fn tile<'py>(
     for (name, map, kind) in &maps {
         let map = map.picture(py)?;
         ensure_same_shape(name, &map, &photo).into_py(py)?;
-        others.push((name.clone(), map, map_kind(kind).into_py(py)?));
+        others.push((name.clone(), map, kind_named(kind).into_py(py)?));
     }
     let ctx = Ctx::new(seed, threads).into_py(py)?;
     let job = ctx.job();
@@ -102,19 +102,25 @@ fn tile<'py>(
 
 /// Gathers a map through a source map.
 #[pyfunction]
-#[pyo3(signature = (*, source_map, map, kind))]
+#[pyo3(signature = (*, source_map, picture, kind))]
 fn apply<'py>(
     py: Python<'py>,
     source_map: MapIn<'py>,
-    map: ArrayIn<'py>,
+    picture: ArrayIn<'py>,
     kind: &str,
 ) -> PyResult<ArrayOut<'py>> {
-    let kind = map_kind(kind).into_py(py)?;
+    let kind = kind_named(kind).into_py(py)?;
     let source_map = source_map.source_map(py)?;
-    let map = map.picture(py)?;
+    let picture = picture.picture(py)?;
     let job = std::sync::Arc::<Job>::default();
-    let out = enter::enter(py, &job, None, move || source_map.apply(&map, kind))?;
+    let out = enter::enter(py, &job, None, move || source_map.apply(&picture, kind))?;
     array_out(py, &out)
+}
+
+/// What the numbers of a material's map of this name are.
+#[pyfunction]
+fn map_kind(name: &str) -> &'static str {
+    if name.contains("nor") { "normal" } else { "data" }
 }
 
 /// Every parameter of `tile`, with its default as text.
@@ -158,7 +164,7 @@ fn cli_main(py: Python<'_>, args: Vec<OsString>) -> u8 {
 #[pymodule(gil_used = false)]
 mod _texforge {
     #[pymodule_export]
-    use super::{apply, cli_main, error_kinds, fail, schema, tile};
+    use super::{apply, cli_main, error_kinds, fail, map_kind, schema, tile};
 
     use pyo3::prelude::*;
 
