@@ -386,20 +386,10 @@ def save_tile(tile: Tile, path: PathType, *, overwrite: bool) -> None:
 
 def preview_png(tile: Tile) -> bytes | None:
     """Return the tile repeated two by two as an 8-bit PNG; None for data that is no picture."""
-    image = tile.image if tile.image.ndim == 3 else tile.image[:, :, np.newaxis]
-    if image.shape[2] > 4:
+    image = _arrays.displayable(tile.image, tile.encoding)
+    if image is None:
         return None
-    if image.dtype == np.uint16:
-        image = (image >> 8).astype(np.uint8)
-    elif image.dtype != np.uint8:
-        unit = np.clip(np.nan_to_num(image.astype(np.float32)), 0.0, 1.0)
-        if tile.encoding == "linear":
-            n_colors = image.shape[2] - (image.shape[2] in (2, 4))
-            light = unit[:, :, :n_colors]
-            curve = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
-            unit = np.concatenate([curve, unit[:, :, n_colors:]], axis=2)
-        image = (unit * 255 + 0.5).astype(np.uint8)
-    image = np.tile(np.asarray(image), (2, 2, 1))
+    image = np.tile(image, (2, 2, 1))
     # Averages whole blocks; texels at the far edge that fill no block are left out.
     step = -(-max(image.shape[:2]) // _PREVIEW_SIDE)
     if step > 1:

@@ -77,6 +77,25 @@ def array_encoding(name: str) -> Encoding:
     )
 
 
+def displayable(image: npt.NDArray[Any], encoding: Encoding) -> npt.NDArray[np.uint8] | None:
+    """Return 8-bit sRGB to look at, height x width x channels; None if there is no such thing."""
+    array = np.asarray(image).reshape(*image.shape[:2], -1)
+    if array.shape[2] > 4:
+        return None
+    if array.dtype == np.uint16:
+        return (array >> 8).astype(np.uint8)
+    if array.dtype == np.uint8:
+        return array
+    unit = np.clip(np.nan_to_num(array.astype(np.float32)), 0.0, 1.0)
+    if encoding == "linear":
+        n_colors = array.shape[2] - (array.shape[2] in (2, 4))
+        light = unit[:, :, :n_colors]
+        unit[:, :, :n_colors] = np.where(
+            light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055
+        )
+    return (unit * 255 + 0.5).astype(np.uint8)
+
+
 def picture(image: Any, what: str, encoding: str = "auto") -> Picture:
     """Return `image` ready for the core; `what` names it in messages."""
     if encoding != "auto":
