@@ -1,1 +1,3 @@
-//! Room.
+//! Room 4: numbers about one picture.
+
+pub mod stationarity;

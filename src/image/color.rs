@@ -1,1 +1,243 @@
-//! sRGB, linear light and CIE L*a*b* (D65).
+//! sRGB, linear light and CIE L*a*b* (D65), and the space in which patches are compared.
+
+use std::sync::LazyLock;
+
+use rayon::prelude::*;
+
+use crate::image::picture::{Encoding, Picture, Sample};
+use crate::with_samples;
+
+/// Linear light from a display-referred sRGB value in `0..=1` (IEC 61966-2-1).
+pub fn linear_from_srgb(v: f64) -> f64 {
+    if v <= 0.040_45 { v / 12.92 } else { libm::pow((v + 0.055) / 1.055, 2.4) }
+}
+
+/// Display-referred sRGB from linear light in `0..=1`.
+pub fn srgb_from_linear(v: f64) -> f64 {
+    if v <= 0.003_130_8 { v * 12.92 } else { 1.055 * libm::pow(v, 1.0 / 2.4) - 0.055 }
+}
+
+/// Steps of the table of cube roots; linear interpolation then errs by less than 1e-5.
+const ROOT_STEPS: usize = 8192;
+
+/// The function f of CIE L*a*b*, tabulated over `0..=1`.
+static LAB_CURVE: LazyLock<Vec<f32>> = LazyLock::new(|| {
+    (0..=ROOT_STEPS + 1).map(|i| lab_curve_exact(i as f32 / ROOT_STEPS as f32)).collect()
+});
+
+fn lab_curve_exact(t: f32) -> f32 {
+    if t > 216.0 / 24389.0 { libm::cbrtf(t) } else { (t * (24389.0 / 27.0) + 16.0) / 116.0 }
+}
+
+#[inline]
+fn lab_curve(table: &[f32], t: f32) -> f32 {
+    if (0.0..=1.0).contains(&t) {
+        let at = t * ROOT_STEPS as f32;
+        let i = at as usize;
+        table[i] + (table[i + 1] - table[i]) * (at - i as f32)
+    } else {
+        lab_curve_exact(t)
+    }
+}
+
+/// CIE L*a*b* (D65, two-degree observer) from linear RGB with sRGB primaries. Values above 1 go
+/// on above L* = 100.
+#[inline]
+fn lab_from_linear(table: &[f32], [r, g, b]: [f32; 3]) -> [f32; 3] {
+    // The matrix of IEC 61966-2-1 with each row divided by the white point.
+    let x = 0.433_953 * r + 0.376_219 * g + 0.189_828 * b;
+    let y = 0.212_671 * r + 0.715_160 * g + 0.072_169 * b;
+    let z = 0.017_758 * r + 0.109_477 * g + 0.872_765 * b;
+    let (fx, fy, fz) = (lab_curve(table, x), lab_curve(table, y), lab_curve(table, z));
+    [116.0 * fy - 16.0, 500.0 * (fx - fy), 200.0 * (fy - fz)]
+}
+
+/// How the three averaging channels become the three matching channels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MatchSpace {
+    /// Linear RGB becomes L*a*b*.
+    Lab,
+    /// Data: full scale becomes 100, the range of L*.
+    Data,
+}
+
+impl MatchSpace {
+    /// Converts a row of averaging pixels in place.
+    pub fn convert_row(self, row: &mut [[f32; 3]]) {
+        match self {
+            Self::Lab => {
+                let table = &LAB_CURVE[..];
+                row.iter_mut().for_each(|px| *px = lab_from_linear(table, *px));
+            }
+            Self::Data => row.as_flattened_mut().iter_mut().for_each(|v| *v *= 100.0),
+        }
+    }
+}
+
+/// Three channels a pixel in the space where averages are right: linear light for colours, the
+/// numbers themselves for data (by principal components if there are more than three).
+pub fn averaging_pixels(picture: &Picture) -> (Vec<[f32; 3]>, MatchSpace) {
+    let c = picture.channels();
+    let gray = picture.encoding != Encoding::Data && c <= 2;
+    let curve = |v: f64| match picture.encoding {
+        Encoding::Srgb => linear_from_srgb(v),
+        Encoding::Linear | Encoding::Data => v,
+    };
+    let space = match (picture.encoding, c) {
+        (Encoding::Srgb | Encoding::Linear, 1..=4) => MatchSpace::Lab,
+        _ => MatchSpace::Data,
+    };
+    if space == MatchSpace::Data && c > 3 {
+        return (crate::image::color::principal_components(picture), space);
+    }
+    let pick = |px: [f32; 4]| if gray { [px[0]; 3] } else { [px[0], px[1], px[2]] };
+    let n_used = if gray { 1 } else { c.min(3) };
+    let pixels = match picture.samples() {
+        // Integers by table.
+        crate::Samples::U8(v) => {
+            let table: Vec<f32> = (0..=255u8).map(|i| curve(i.to_unit()) as f32).collect();
+            v.par_chunks_exact(c)
+                .map(|px| {
+                    let mut out = [0.0; 4];
+                    (0..n_used).for_each(|k| out[k] = table[px[k] as usize]);
+                    pick(out)
+                })
+                .collect()
+        }
+        crate::Samples::U16(v) => {
+            let table: Vec<f32> = (0..=65535u16).map(|i| curve(i.to_unit()) as f32).collect();
+            v.par_chunks_exact(c)
+                .map(|px| {
+                    let mut out = [0.0; 4];
+                    (0..n_used).for_each(|k| out[k] = table[px[k] as usize]);
+                    pick(out)
+                })
+                .collect()
+        }
+        samples => with_samples!(samples, v => v
+            .par_chunks_exact(c)
+            .map(|px| {
+                let mut out = [0.0; 4];
+                for k in 0..n_used {
+                    // Only hidden pixels may be NaN here, and those are never used.
+                    let value = curve(px[k].to_unit()) as f32;
+                    out[k] = if value.is_finite() { value } else { 0.0 };
+                }
+                pick(out)
+            })
+            .collect()),
+    };
+    (pixels, space)
+}
+
+/// The three strongest principal components of a picture with many channels, by power iteration
+/// on the covariance of at most 65536 evenly spaced pixels.
+fn principal_components(picture: &Picture) -> Vec<[f32; 3]> {
+    let c = picture.channels();
+    let n = picture.height() * picture.width();
+    let value = |i: usize, k: usize| picture.samples().unit(i * c + k);
+    let step = n.div_ceil(65_536);
+    let sample: Vec<usize> = (0..n).step_by(step).collect();
+    let mut mean = vec![0.0; c];
+    for &i in &sample {
+        (0..c).for_each(|k| mean[k] += value(i, k) / sample.len() as f64);
+    }
+    let mut covariance = vec![0.0; c * c];
+    for &i in &sample {
+        for a in 0..c {
+            for b in 0..c {
+                covariance[a * c + b] += (value(i, a) - mean[a]) * (value(i, b) - mean[b]);
+            }
+        }
+    }
+    let mut axes: Vec<Vec<f64>> = Vec::new();
+    for _ in 0..3 {
+        let mut axis: Vec<f64> = (0..c).map(|k| 1.0 + k as f64 / c as f64).collect();
+        for _ in 0..64 {
+            let mut next: Vec<f64> =
+                (0..c).map(|a| (0..c).map(|b| covariance[a * c + b] * axis[b]).sum()).collect();
+            for done in &axes {
+                let along: f64 = next.iter().zip(done).map(|(u, v)| u * v).sum();
+                next.iter_mut().zip(done).for_each(|(u, v)| *u -= along * v);
+            }
+            let norm = next.iter().map(|v| v * v).sum::<f64>().sqrt();
+            if norm <= f64::MIN_POSITIVE {
+                next = vec![0.0; c];
+            } else {
+                next.iter_mut().for_each(|v| *v /= norm);
+            }
+            axis = next;
+        }
+        axes.push(axis);
+    }
+    (0..n)
+        .into_par_iter()
+        .map(|i| {
+            std::array::from_fn(|a| {
+                (0..c).map(|k| (value(i, k) - mean[k]) * axes[a][k]).sum::<f64>() as f32
+            })
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lab(rgb: [u8; 3]) -> [f32; 3] {
+        let px = rgb.map(|v| linear_from_srgb(f64::from(v) / 255.0) as f32);
+        lab_from_linear(&LAB_CURVE, px)
+    }
+
+    #[test]
+    fn known_colors() {
+        // Values from the CIE formulas with the sRGB matrix (Lindbloom's calculator, D65).
+        for (rgb, expected) in [
+            ([255, 255, 255], [100.0, 0.0, 0.0]),
+            ([255, 0, 0], [53.24, 80.09, 67.20]),
+            ([0, 255, 0], [87.73, -86.18, 83.18]),
+            ([0, 0, 255], [32.30, 79.19, -107.86]),
+            ([119, 119, 119], [50.03, 0.0, 0.0]),
+            ([0, 0, 0], [0.0, 0.0, 0.0]),
+        ] {
+            let got = lab(rgb);
+            for k in 0..3 {
+                assert!((got[k] - expected[k]).abs() < 0.05, "{rgb:?}: {got:?} != {expected:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_table_agrees_with_the_formula() {
+        for i in 0..=100_000 {
+            let t = i as f32 / 100_000.0;
+            let error = (lab_curve(&LAB_CURVE, t) - lab_curve_exact(t)).abs();
+            assert!(error < 1e-5, "f({t}) errs by {error}");
+        }
+    }
+
+    #[test]
+    fn srgb_round_trip() {
+        for i in 0..=255u8 {
+            let v = f64::from(i) / 255.0;
+            assert!((srgb_from_linear(linear_from_srgb(v)) - v).abs() < 1e-7, "at {i}");
+        }
+    }
+
+    #[test]
+    fn many_channels_keep_their_main_variation() {
+        // Five channels that are multiples of one pattern: the first component carries it all.
+        let pattern = |i: usize| ((i * 37) % 101) as f32 / 101.0;
+        let samples = (0..400).flat_map(|i| (1..=5).map(move |k| pattern(i) * k as f32)).collect();
+        let picture =
+            Picture::new(20, 20, 5, crate::Samples::F32(samples), Encoding::Data).expect("valid");
+        let (px, space) = averaging_pixels(&picture);
+        assert_eq!(space, MatchSpace::Data);
+        let scale = (1..=5).map(|k| (k * k) as f32).sum::<f32>().sqrt();
+        for i in 1..400 {
+            let step = (px[i][0] - px[i - 1][0]).abs();
+            assert!((step - (pattern(i) - pattern(i - 1)).abs() * scale).abs() < 1e-3, "at {i}");
+            assert!(px[i][1].abs() < 1e-3 && px[i][2].abs() < 1e-3, "at {i}");
+        }
+    }
+}

@@ -1,1 +1,4 @@
-//! Room.
+//! Room 5: the methods, one paper or baseline each.
+
+pub mod make_seamless;
+pub mod stationary;

@@ -1,1 +1,7 @@
-//! Room.
+//! Room 3: who looks like whom.
+
+pub mod field;
+pub mod patch;
+pub mod patchmatch;
+pub mod source;
+pub mod vote;

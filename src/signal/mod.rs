@@ -1,1 +1,5 @@
-//! Room.
+//! Room 2: mathematics on planes. No textures, no policy.
+
+pub mod histogram;
+pub mod localhist;
+pub mod resample;

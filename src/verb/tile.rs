@@ -8,6 +8,8 @@ use crate::base::params::{Value, choice, params};
 use crate::image::mask::Mask;
 use crate::image::picture::Picture;
 use crate::image::sourcemap::SourceMap;
+use crate::method::stationary;
+use crate::search::patchmatch::Wrap;
 
 /// Size of the tile.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -109,7 +111,7 @@ params! {
         /// Reach of the stationarity measure: smaller evens out smaller stains, larger keeps more variety.
         sigma: f32 = 0.1, in 0.01..=1.0, unit "fraction of the tile's shorter side";
         /// Side of the patches that are compared; odd. Larger keeps larger features whole, smaller mixes more.
-        patch: usize = 11, in 3..=31, unit "px";
+        patch: usize = 11, in 3..=21, unit "px";
         /// How strongly every part of the photo is made to contribute equally; 0 switches it off.
         uniformity: f32 = 1.0, in 0.0..=100.0;
         /// How much time to spend.
@@ -197,6 +199,28 @@ impl TileParams {
 /// (checked before anything is allocated), [`Error::Cancelled`].
 pub fn tile(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, params: &TileParams) -> Result<Tile> {
     params.validate()?;
-    let _ = (ctx, photo, mask);
-    Err(Error::Cancelled)
+    let (width, height) = params.resolved_size(photo.width(), photo.height());
+    let plan = stationary::Plan {
+        size: (height, width),
+        wrap: Wrap { y: params.axis != Axis::X, x: params.axis != Axis::Y },
+        sigma: (params.method == Method::Stationary && params.measure != Measure::None)
+            .then_some(params.sigma),
+        patch: params.patch,
+        uniformity: params.uniformity,
+        coarse_iterations: 30,
+        fine_iterations: 2,
+    };
+    let output = ctx.install(|| stationary::run(ctx, photo, mask, &plan))?;
+    let picture = output.source_map.apply(photo, crate::MapKind::Data)?;
+    let report = Report {
+        version: env!("CARGO_PKG_VERSION"),
+        seed: ctx.seed,
+        params: params.show(),
+        photo_size: (photo.width(), photo.height()),
+        tile_size: (width, height),
+        costs: Costs { texture: 0.0, stationarity: 0.0 },
+        seconds: vec![],
+        notes: vec![],
+    };
+    Ok(Tile { picture, source_map: Some(output.source_map), report })
 }

@@ -1,0 +1,1 @@
+//! Baseline "make seamless", as image editors do it.

@@ -1,0 +1,158 @@
+//! The exemplar's pyramid in the matching space.
+
+use crate::base::error::{Error, Result};
+use crate::image::color::{MatchSpace, averaging_pixels};
+use crate::image::mask::Mask;
+use crate::image::picture::Picture;
+use crate::method::stationary::Plan;
+use crate::search::patch::{CODE_MAX, MatchImage};
+use crate::search::source::Source;
+use crate::signal::histogram::{Bins, Distribution, Quantiles};
+use crate::signal::resample::{resized, resized_mask};
+
+/// Ratio of the sides of two neighbouring levels (the paper's).
+const RATIO: f64 = 1.3;
+
+/// Shorter side of the coarsest level, at least (the paper's).
+const COARSEST: f64 = 64.0;
+
+/// Affine map between L*a*b* and 7-bit codes, the same scale for all channels, so that distances
+/// of codes are Euclidean distances of colours.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Codes {
+    low: [f32; 3],
+    /// Codes per unit.
+    pub(super) scale: f32,
+}
+
+impl Codes {
+    /// Covers 99.8 % of each channel's usable values.
+    fn covering(pixels: &[[f32; 3]], usable: Option<&[bool]>) -> Self {
+        // A hundred thousand samples fix the ends well enough.
+        let step = (pixels.len() / 100_000).max(1);
+        let mut low = [0.0; 3];
+        let mut range = 0f32;
+        for k in 0..3 {
+            let mut values: Vec<f32> = (0..pixels.len())
+                .step_by(step)
+                .filter(|&i| usable.is_none_or(|u| u[i]))
+                .map(|i| pixels[i][k])
+                .collect();
+            if values.is_empty() {
+                values.push(0.0);
+            }
+            values.sort_unstable_by(f32::total_cmp);
+            let cut = values.len() / 1000;
+            low[k] = values[cut];
+            range = range.max(values[values.len() - 1 - cut] - low[k]);
+        }
+        Self { low, scale: CODE_MAX as f32 / range.max(1.0) }
+    }
+
+    /// The codes of a colour, rounded; colours outside the range are cut.
+    #[inline]
+    pub(super) fn encode(&self, lab: [f32; 3]) -> [u8; 4] {
+        let code = |k: usize| {
+            ((lab[k] - self.low[k]) * self.scale + 0.5).clamp(0.0, CODE_MAX as f32) as u8
+        };
+        [code(0), code(1), code(2), 0]
+    }
+
+    /// The colour of codes (or means of codes).
+    #[inline]
+    pub(super) fn lab(&self, code: [f32; 4]) -> [f32; 3] {
+        std::array::from_fn(|k| self.low[k] + code[k] / self.scale)
+    }
+}
+
+/// One level of the pyramid.
+#[derive(Debug)]
+pub(super) struct Level {
+    /// Height and width of the output.
+    pub(super) size: (usize, usize),
+    /// The exemplar.
+    pub(super) source: Source,
+    /// Between colours and codes.
+    pub(super) codes: Codes,
+    /// The exemplar's quantiles per channel.
+    pub(super) quantiles: [Quantiles; 3],
+    /// Uniformity cost of using a patch as often as the average, in squared codes.
+    pub(super) usage_unit: f32,
+}
+
+/// All levels, finest first.
+///
+/// # Errors
+/// [`Error::EmptyMask`] if no whole patch is usable at full size.
+pub(super) fn build(photo: &Picture, mask: Option<&Mask>, plan: &Plan) -> Result<Vec<Level>> {
+    let (h, w) = plan.size;
+    let (mut eh, mut ew) = (photo.height(), photo.width());
+    let (mut pixels, space) = averaging_pixels(photo);
+    let mut usable = mask.map(|m| m.usable().to_vec());
+    let n_usable = mask.map_or(eh * ew, Mask::count);
+    let coarsest = COARSEST.max(h.min(w) as f64 / 4.0);
+    let n_levels = ((h.min(w) as f64 / coarsest).ln() / RATIO.ln()).ceil().max(0.0) as usize + 1;
+    let mut codes = None;
+    let mut levels = Vec::new();
+    for j in 0..n_levels {
+        let at = |n: usize| (n as f64 / RATIO.powi(j as i32)).round() as usize;
+        if j > 0 {
+            let to = (at(photo.height()), at(photo.width()));
+            if to.0 < 2 * plan.patch || to.1 < 2 * plan.patch || at(h.min(w)) < plan.patch {
+                break;
+            }
+            pixels = resized(&pixels, (eh, ew), to);
+            usable = usable.map(|u| resized_mask(&u, (eh, ew), to));
+            (eh, ew) = to;
+        }
+        let size = (at(h), at(w));
+        match level(&pixels, space, (eh, ew), usable.as_deref(), size, plan.patch, &mut codes) {
+            Some(level) => levels.push(level),
+            // A thin mask leaves no patch at coarse levels: start with finer ones.
+            None if j > 0 => break,
+            None => return Err(Error::EmptyMask { usable: n_usable, patch: plan.patch }),
+        }
+    }
+    Ok(levels)
+}
+
+fn level(
+    pixels: &[[f32; 3]],
+    space: MatchSpace,
+    (eh, ew): (usize, usize),
+    usable: Option<&[bool]>,
+    size: (usize, usize),
+    patch: usize,
+    codes: &mut Option<Codes>,
+) -> Option<Level> {
+    use rayon::prelude::*;
+    let mut lab = pixels.to_vec();
+    lab.par_chunks_mut(ew).for_each(|row| space.convert_row(row));
+    let codes = *codes.get_or_insert_with(|| Codes::covering(&lab, usable));
+    let mut image = MatchImage::new(eh, ew);
+    image.fill_rows(|y, row| {
+        row.iter_mut().zip(&lab[y * ew..]).for_each(|(px, &lab)| *px = codes.encode(lab));
+    });
+    let step = (lab.len() / 200_000).max(1);
+    let sample: Vec<[f32; 3]> = (0..lab.len())
+        .step_by(step)
+        .filter(|&i| usable.is_none_or(|u| u[i]))
+        .map(|i| lab[i])
+        .collect();
+    let quantiles = std::array::from_fn(|k| {
+        let bins = Bins::covering(sample.iter().map(|px| px[k]), 256);
+        Distribution::of(sample.iter().map(|px| px[k]), bins).quantiles()
+    });
+    let variance: f64 = (0..3)
+        .map(|k| {
+            let mean =
+                sample.iter().map(|px| px[k] as f64).sum::<f64>() / sample.len().max(1) as f64;
+            sample.iter().map(|px| (px[k] as f64 - mean).powi(2)).sum::<f64>()
+                / sample.len().max(1) as f64
+        })
+        .sum();
+    let usage_unit =
+        (0.02 * variance * (codes.scale * codes.scale) as f64 * (patch * patch) as f64) as f32;
+    let source = Source::new(image, patch, usable)?;
+    Some(Level { size, source, codes, quantiles, usage_unit })
+}

@@ -1,0 +1,117 @@
+//! Patch distance: the kernel everything waits for.
+//!
+//! A [`MatchImage`] holds 7-bit codes of the matching space, four bytes a pixel. With codes below
+//! 128 an inner product of two patches is exact in every instruction set's cheapest
+//! multiply-add (`vpdpbusd`, `vpmaddubsw` without saturation, plain Rust), so that
+//! `|f - e|^2 = |f|^2 + |e|^2 - 2 f.e` costs one load and one multiply-add per patch row, all
+//! levels give the same integer, and the constant terms come from a table.
+
+mod scalar;
+mod simd;
+
+pub use scalar::distance_squared;
+
+use crate::base::ctx::Simd;
+
+/// Bytes after the last pixel that kernels may read (and multiply by zero).
+const TAIL: usize = 128;
+
+/// Largest code.
+pub const CODE_MAX: u8 = 127;
+
+/// Largest patch side: with it, a sum of 7-bit codes over a patch still fits into 16 bits.
+pub const PATCH_MAX: usize = 21;
+
+/// A picture in the matching space: codes in `0..=127`, four bytes a pixel, row by row.
+#[derive(Debug, Clone)]
+pub struct MatchImage {
+    height: usize,
+    width: usize,
+    codes: Vec<u8>,
+}
+
+impl MatchImage {
+    /// A picture of zeros.
+    pub fn new(height: usize, width: usize) -> Self {
+        Self { height, width, codes: vec![0; height * width * 4 + TAIL] }
+    }
+
+    /// Height in pixels.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// Width in pixels.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// The codes of pixel (`y`, `x`).
+    #[inline]
+    pub fn pixel(&self, y: usize, x: usize) -> [u8; 4] {
+        let at = (y * self.width + x) * 4;
+        [self.codes[at], self.codes[at + 1], self.codes[at + 2], self.codes[at + 3]]
+    }
+
+    /// All codes without the tail, row by row.
+    #[inline]
+    pub fn codes(&self) -> &[u8] {
+        &self.codes[..self.height * self.width * 4]
+    }
+
+    /// Writes rows of pixels through `fill(y, row)`; codes above 127 are cut to 127.
+    pub fn fill_rows(&mut self, fill: impl Fn(usize, &mut [[u8; 4]]) + Sync) {
+        use rayon::prelude::*;
+        let n = self.height * self.width * 4;
+        let (width, codes) = (self.width, &mut self.codes[..n]);
+        codes.par_chunks_mut(width * 4).enumerate().for_each(|(y, row)| {
+            let row: &mut [[u8; 4]] = bytemuck::cast_slice_mut(row);
+            fill(y, row);
+            for code in row.as_flattened_mut() {
+                *code = (*code).min(CODE_MAX);
+            }
+        });
+    }
+}
+
+/// An inner-product kernel of one instruction set, for patches of a fixed side.
+pub trait Kernel: Copy + Send + Sync {
+    /// The rows of one patch, held ready.
+    type Query;
+
+    /// An empty query, to be reused from patch to patch.
+    fn query(&self) -> Self::Query;
+
+    /// Holds the patch of `image` whose top left pixel has index `at` ready.
+    fn hold(&self, query: &mut Self::Query, image: &MatchImage, at: usize);
+
+    /// Inner product of the held patch and the patch of `image` whose top left pixel has index
+    /// `at` (over rows, columns and channels).
+    fn dot(&self, query: &Self::Query, image: &MatchImage, at: usize) -> i32;
+
+    /// Asks the cache for the patch of `image` at `at`.
+    fn prefetch(&self, image: &MatchImage, at: usize);
+}
+
+/// Work that wants a [`Kernel`]; [`with_kernel`] calls it with the best one.
+pub trait WithKernel {
+    /// What the work returns.
+    type Output;
+    /// Does the work. Must be `#[inline(always)]`, so that it is compiled for the kernel's
+    /// instruction set.
+    fn run<K: Kernel>(self, kernel: K) -> Self::Output;
+}
+
+/// Runs `work` with the best kernel for patches of side `patch` that the CPU has, at most `limit`.
+///
+/// # Determinism
+/// All kernels return the same integers.
+pub fn with_kernel<W: WithKernel>(limit: Simd, patch: usize, work: W) -> W::Output {
+    assert!((1..=PATCH_MAX).contains(&patch), "patch side {patch} is not in 1..={PATCH_MAX}");
+    simd::dispatch(limit, patch, work)
+}
+
+/// The instruction set that [`with_kernel`] takes under `limit` on this CPU.
+pub fn detected(limit: Simd) -> Simd {
+    simd::detect().min(limit)
+}

@@ -1,0 +1,61 @@
+//! The kernel in plain Rust: the definition the others are tested against.
+
+use super::{Kernel, MatchImage};
+
+/// Plain Rust; `N` is the patch side.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Scalar {
+    pub(super) patch: usize,
+}
+
+impl Kernel for Scalar {
+    type Query = Vec<u8>;
+
+    fn query(&self) -> Vec<u8> {
+        vec![0; 4 * self.patch * self.patch]
+    }
+
+    #[inline]
+    fn hold(&self, query: &mut Vec<u8>, image: &MatchImage, at: usize) {
+        let n = self.patch;
+        for (row, held) in query.chunks_exact_mut(4 * n).enumerate() {
+            let start = (at + row * image.width) * 4;
+            held.copy_from_slice(&image.codes[start..start + 4 * n]);
+        }
+    }
+
+    #[inline]
+    fn dot(&self, query: &Vec<u8>, image: &MatchImage, at: usize) -> i32 {
+        let n = self.patch;
+        let mut sum = 0;
+        for (row, held) in query.chunks_exact(4 * n).enumerate() {
+            let start = (at + row * image.width) * 4;
+            let other = &image.codes[start..start + 4 * n];
+            sum += held.iter().zip(other).map(|(&a, &b)| a as i32 * b as i32).sum::<i32>();
+        }
+        sum
+    }
+
+    #[inline]
+    fn prefetch(&self, _image: &MatchImage, _at: usize) {}
+}
+
+/// Squared distance of two patches by its definition: the sum over rows, columns and channels of
+/// the squared difference of the codes. `a_at` and `b_at` are pixel indices of the top left.
+pub fn distance_squared(
+    a: &MatchImage,
+    a_at: usize,
+    b: &MatchImage,
+    b_at: usize,
+    patch: usize,
+) -> i32 {
+    let mut sum = 0;
+    for row in 0..patch {
+        for i in 0..4 * patch {
+            let u = a.codes[(a_at + row * a.width) * 4 + i] as i32;
+            let v = b.codes[(b_at + row * b.width) * 4 + i] as i32;
+            sum += (u - v) * (u - v);
+        }
+    }
+    sum
+}

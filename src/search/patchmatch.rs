@@ -1,0 +1,317 @@
+//! PatchMatch on the torus: propagation and random search, parallel and reproducible.
+//!
+//! The rows of the output are cut into bands of a fixed height. Inside a band the field is
+//! updated in place, in scan order, as in the original algorithm; what lies outside is read from
+//! the previous pass. The bands do not depend on the number of threads, so neither does the result.
+
+use rayon::prelude::*;
+
+use crate::base::ctx::{Ctx, Simd};
+use crate::base::error::Result;
+use crate::base::rng::Rng;
+use crate::search::field::{Field, Pos};
+use crate::search::patch::{Kernel, MatchImage, WithKernel, with_kernel};
+use crate::search::source::{Source, UNUSABLE};
+
+/// Rows of a band. Fewer rows: more parallel work, slower propagation between bands.
+const BAND: usize = 32;
+
+/// Which axes of the output wrap around.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Wrap {
+    /// Vertically: the top continues the bottom.
+    pub y: bool,
+    /// Horizontally: the left edge continues the right one.
+    pub x: bool,
+}
+
+/// How one pass searches.
+#[derive(Debug, Clone, Copy)]
+pub struct Search {
+    /// Number of the pass: its parity gives the scan direction, and it keys the random numbers.
+    pub pass: u32,
+    /// Radius of the widest random search in pixels; 0 means the whole source.
+    pub radius: usize,
+    /// Number of random candidates a pixel; each has half the radius of the one before.
+    pub n_random: u32,
+}
+
+/// How often each place of the source is used, as a cost (Kaspar et al. 2015, spatial uniformity).
+#[derive(Debug, Clone)]
+pub struct Usage {
+    cols: usize,
+    shift: u32,
+    cost: Vec<i32>,
+}
+
+impl Usage {
+    /// No cost anywhere.
+    pub fn free(source: &Source) -> Self {
+        let shift = cell_shift(source.patch);
+        let cols = (source.cols() >> shift) + 1;
+        Self { cols, shift, cost: vec![0; cols * ((source.rows() >> shift) + 1)] }
+    }
+
+    /// The cost of using each source patch once more: `weight * occurrence / w_best`, where the
+    /// occurrence (how many matched patches cover a pixel) is averaged over the patch.
+    ///
+    /// # Paper
+    /// Moritz et al. 2017, eq. 6: `w_best = max(1, |T| / |S|) * N^2`. Counts are kept on a grid of
+    /// cells of a third of a patch, which a patch average cannot tell from pixels.
+    pub fn of(field: &Field, source: &Source, weight: f32) -> Self {
+        let mut usage = Self::free(source);
+        let (shift, n) = (usage.shift, source.patch);
+        let (cols, rows) = (usage.cols, (source.rows() >> shift) + 1);
+        let mut count = vec![0u32; rows * cols];
+        for pos in &field.pos {
+            count[(pos.y() >> shift) * cols + (pos.x() >> shift)] += 1;
+        }
+        // The box of "covers the pixel" and the box of "averaged over the patch" make a tent.
+        let reach = (n >> shift).max(1);
+        let tent = |v: &[f32], out: &mut [f32]| {
+            for (i, out) in out.iter_mut().enumerate() {
+                let mut sum = v[i] * reach as f32;
+                for d in 1..reach {
+                    let weight = (reach - d) as f32;
+                    sum += weight * (if i >= d { v[i - d] } else { 0.0 });
+                    sum += weight * (if i + d < v.len() { v[i + d] } else { 0.0 });
+                }
+                *out = sum / (reach * reach) as f32;
+            }
+        };
+        let mut horizontal = vec![0f32; rows * cols];
+        horizontal.par_chunks_mut(cols).zip(count.par_chunks(cols)).for_each(|(out, count)| {
+            let count: Vec<f32> = count.iter().map(|&c| c as f32).collect();
+            tent(&count, out);
+        });
+        // Patches per cell; in units of one use of each pixel, every cell holds 4^shift of them.
+        let w_best = (field.pos.len() as f64 / source.n_usable() as f64).max(1.0);
+        let unit = weight as f64 / (w_best * f64::from(1u32 << (2 * shift)));
+        usage.cost.par_chunks_mut(cols).enumerate().for_each(|(y, out)| {
+            for (x, out) in out.iter_mut().enumerate() {
+                let at = |y: usize| horizontal[y * cols + x];
+                let mut sum = at(y) * reach as f32;
+                for d in 1..reach {
+                    let weight = (reach - d) as f32;
+                    sum += weight * (if y >= d { at(y - d) } else { 0.0 });
+                    sum += weight * (if y + d < rows { at(y + d) } else { 0.0 });
+                }
+                // Saturates far below UNUSABLE, so that sums with distances cannot overflow.
+                let cost = (sum / reach as f32) as f64 * unit;
+                *out = cost.min(f64::from(1 << 28)) as i32;
+            }
+        });
+        usage
+    }
+
+    #[inline]
+    fn cost(&self, pos: Pos) -> i32 {
+        self.cost[(pos.y() >> self.shift) * self.cols + (pos.x() >> self.shift)]
+    }
+}
+
+/// Cells of 4 pixels for patches of 8 and more, of 2 from 4 on, else of 1.
+fn cell_shift(patch: usize) -> u32 {
+    match patch {
+        0..4 => 0,
+        4..8 => 1,
+        _ => 2,
+    }
+}
+
+/// One pass over the field: every output position takes the best of its own match, the
+/// neighbours' matches shifted by one, and random positions around the best.
+///
+/// `target` is the output in the matching space with an apron of `patch - 1`: the patch of output
+/// pixel (y, x) has its top left corner at (y, x). The score that is minimized is the squared
+/// patch distance plus `usage`. Counts `field.height` units of progress.
+///
+/// # Determinism
+/// Same bytes for any thread count and SIMD level.
+///
+/// # Errors
+/// [`Error::Cancelled`](crate::Error::Cancelled).
+pub fn pass(
+    ctx: &Ctx,
+    target: &MatchImage,
+    source: &Source,
+    usage: &Usage,
+    wrap: Wrap,
+    search: Search,
+    field: &mut Field,
+) -> Result<()> {
+    let mut next = field.pos.clone();
+    let band = Band { target, source, usage, wrap, search, field, seed: ctx.seed };
+    // Every other pair of passes the bands are shifted by half: no row is always at an edge.
+    let head = if search.pass % 4 < 2 { 0 } else { (BAND / 2).min(field.height) };
+    let (first, rest) = next.split_at_mut(head * field.width);
+    let bands = std::iter::once((0, first)).filter(|(_, rows)| !rows.is_empty());
+    let rest = rest.chunks_mut(BAND * field.width).enumerate();
+    let bands: Vec<_> = bands.chain(rest.map(|(i, rows)| (head + i * BAND, rows))).collect();
+    bands.into_par_iter().try_for_each(|(y0, rows)| {
+        with_kernel(ctx.simd, source.patch, BandJob { band: &band, ctx, y0, rows })
+    })?;
+    field.pos = next;
+    Ok(())
+}
+
+struct BandJob<'a, 'b> {
+    band: &'a Band<'a>,
+    ctx: &'a Ctx,
+    y0: usize,
+    rows: &'b mut [Pos],
+}
+
+impl WithKernel for BandJob<'_, '_> {
+    type Output = Result<()>;
+
+    #[inline(always)]
+    fn run<K: Kernel>(self, kernel: K) -> Result<()> {
+        self.band.scan(kernel, self.ctx, self.y0, self.rows)
+    }
+}
+
+struct Band<'a> {
+    target: &'a MatchImage,
+    source: &'a Source,
+    usage: &'a Usage,
+    wrap: Wrap,
+    search: Search,
+    field: &'a Field,
+    seed: u64,
+}
+
+impl Band<'_> {
+    /// Updates the rows from `y0` on in place.
+    #[inline(always)]
+    fn scan<K: Kernel>(&self, kernel: K, ctx: &Ctx, y0: usize, rows: &mut [Pos]) -> Result<()> {
+        let (height, width) = (self.field.height, self.field.width);
+        let n_rows = rows.len() / width;
+        let backward = self.search.pass % 2 == 1;
+        let mut query = kernel.query();
+        for step in 0..n_rows {
+            let row = if backward { n_rows - 1 - step } else { step };
+            let y = y0 + row;
+            for step in 0..width {
+                let x = if backward { width - 1 - step } else { step };
+                kernel.hold(&mut query, self.target, y * self.target.width() + x);
+                let own = rows[row * width + x];
+                let mut best = (self.score(kernel, &query, own), own);
+
+                // The neighbours that the scan has just left, shifted back.
+                let d: isize = if backward { -1 } else { 1 };
+                let beside = neighbor(x, -d, width, self.wrap.x).map(|nx| rows[row * width + nx]);
+                let above = neighbor(y, -d, height, self.wrap.y).map(|ny| {
+                    let inside = ny >= y0 && ny < y0 + n_rows;
+                    if inside {
+                        rows[(ny - y0) * width + x]
+                    } else {
+                        self.field.pos[ny * width + x]
+                    }
+                });
+                let beside = beside.and_then(|p| p.shifted(0, d, self.source));
+                let above = above.and_then(|p| p.shifted(d, 0, self.source));
+                for candidate in [beside, above].into_iter().flatten() {
+                    self.consider(kernel, &query, candidate, &mut best);
+                }
+
+                if self.search.n_random > 0 {
+                    self.random_search(kernel, &query, y * width + x, &mut best);
+                }
+                rows[row * width + x] = best.1;
+            }
+            ctx.step(width as u64)?;
+        }
+        Ok(())
+    }
+
+    #[inline(always)]
+    fn random_search<K: Kernel>(
+        &self,
+        kernel: K,
+        query: &K::Query,
+        item: usize,
+        best: &mut (i32, Pos),
+    ) {
+        const STAGE: u32 = 3;
+        let mut rng = Rng::new(self.seed, STAGE, self.search.pass, item as u64);
+        let (rows, cols) = (self.source.rows() as i32, self.source.cols() as i32);
+        let mut radius = if self.search.radius == 0 {
+            rows.max(cols)
+        } else {
+            (self.search.radius as i32).min(rows.max(cols))
+        };
+        for _ in 0..self.search.n_random {
+            let (y, x) = (best.1.y() as i32, best.1.x() as i32);
+            let (y_low, y_high) = ((y - radius).max(0), (y + radius).min(rows - 1));
+            let (x_low, x_high) = ((x - radius).max(0), (x + radius).min(cols - 1));
+            let y = y_low + rng.below((y_high - y_low + 1) as u32) as i32;
+            let x = x_low + rng.below((x_high - x_low + 1) as u32) as i32;
+            self.consider(kernel, query, Pos::new(y as usize, x as usize), best);
+            radius = (radius / 2).max(1);
+        }
+    }
+
+    #[inline(always)]
+    fn consider<K: Kernel>(
+        &self,
+        kernel: K,
+        query: &K::Query,
+        candidate: Pos,
+        best: &mut (i32, Pos),
+    ) {
+        if candidate == best.1 || self.source.bias(candidate) == UNUSABLE {
+            return;
+        }
+        let score = self.score(kernel, query, candidate);
+        if score < best.0 {
+            *best = (score, candidate);
+        }
+    }
+
+    /// Squared distance less the constant `|f|^2`, plus the usage cost.
+    #[inline(always)]
+    fn score<K: Kernel>(&self, kernel: K, query: &K::Query, pos: Pos) -> i32 {
+        let dot = kernel.dot(query, &self.source.image, self.source.at(pos));
+        self.source.bias(pos) + self.usage.cost(pos) - 2 * dot
+    }
+}
+
+/// Index `d` beside `i` among `n`, around the end if `wrap`.
+#[inline(always)]
+fn neighbor(i: usize, d: isize, n: usize, wrap: bool) -> Option<usize> {
+    let j = i as isize + d;
+    if (0..n as isize).contains(&j) {
+        Some(j as usize)
+    } else if wrap {
+        Some(j.rem_euclid(n as isize) as usize)
+    } else {
+        None
+    }
+}
+
+/// Squared distance between every output patch and its match, in squared codes.
+pub fn distances(simd: Simd, target: &MatchImage, source: &Source, field: &Field) -> Vec<i32> {
+    struct Distances<'a>(&'a MatchImage, &'a Source, &'a Field, usize);
+    impl WithKernel for Distances<'_> {
+        type Output = Vec<i32>;
+        #[inline(always)]
+        fn run<K: Kernel>(self, kernel: K) -> Vec<i32> {
+            let Self(target, source, field, y) = self;
+            let mut query = kernel.query();
+            (0..field.width)
+                .map(|x| {
+                    let at = y * target.width() + x;
+                    kernel.hold(&mut query, target, at);
+                    let pos = field.pos[y * field.width + x];
+                    let own = kernel.dot(&query, target, at);
+                    own + source.bias(pos) - 2 * kernel.dot(&query, &source.image, source.at(pos))
+                })
+                .collect()
+        }
+    }
+    (0..field.height)
+        .into_par_iter()
+        .flat_map_iter(|y| with_kernel(simd, source.patch, Distances(target, source, field, y)))
+        .collect()
+}
