@@ -1,6 +1,9 @@
 //! Maps of a material: what each is, by which names it goes, and how normals are kept unit length.
 
+use std::path::{Path, PathBuf};
+
 use crate::base::error::Result;
+use crate::image::io::files_beside;
 use crate::image::picture::{Picture, Sample};
 use crate::with_samples;
 
@@ -15,8 +18,157 @@ pub enum MapKind {
     Normal,
 }
 
-/// Gives every normal unit length. Vectors that are within one storage step of it already keep
-/// their bits; the zero vector (an undefined normal) is kept too.
+/// A map that materials are made of, and the endings by which files say so.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MapName {
+    /// Our name.
+    pub name: &'static str,
+    /// What its numbers are.
+    pub kind: MapKind,
+    /// The last words of file names, in lower case and without separators between them.
+    pub aliases: &'static [&'static str],
+}
+
+/// Name of the map that a photo is.
+const BASE: &str = "basecolor";
+
+impl MapName {
+    /// Every map that is known. Normal maps of the two conventions (the sign of green) are maps of
+    /// their own; a plain `normal` does not say which it is, and nobody guesses.
+    pub const ALL: [Self; 14] = {
+        use MapKind::{Color, Data, Normal};
+        const fn map(
+            name: &'static str,
+            kind: MapKind,
+            aliases: &'static [&'static str],
+        ) -> MapName {
+            MapName { name, kind, aliases }
+        }
+        [
+            map("ao", Data, &["ao", "occlusion", "ambientocclusion", "occ"]),
+            map("arm", Data, &["arm"]),
+            map(
+                BASE,
+                Color,
+                &["basecolor", "basecolour", "albedo", "diffuse", "diff", "color", "colour", "col"],
+            ),
+            map("emission", Color, &["emission", "emissive", "emit"]),
+            map("gloss", Data, &["gloss", "glossiness", "smoothness"]),
+            map("height", Data, &["height", "displacement", "disp", "bump"]),
+            map("metallic", Data, &["metallic", "metal", "metalness"]),
+            map("normal", Normal, &["normal", "normals", "nrm", "nor", "norm"]),
+            map("normal_dx", Normal, &["normaldx", "nordx", "nrmdx", "normaldirectx"]),
+            map("normal_gl", Normal, &["normalgl", "norgl", "nrmgl", "normalopengl"]),
+            map("opacity", Data, &["opacity", "alpha"]),
+            map("orm", Data, &["orm"]),
+            map("roughness", Data, &["roughness", "rough"]),
+            map("specular", Data, &["specular", "spec"]),
+        ]
+    };
+
+    fn of_alias(alias: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|map| map.aliases.contains(&alias))
+    }
+}
+
+/// The map that a file is by the last words of its name, e.g. `("normal_gl", Normal)` for
+/// `Foo_NormalGL.jpg`, `foo_normal_gl.png` and `foo_nor_gl_4k.exr`. Words are separated by
+/// `_`, `-`, `.` or blanks; sizes and formats (`4k`, `2048`, `png`) may follow.
+pub fn classify(file_name: &str) -> Option<(&'static str, MapKind)> {
+    let parts = parts(file_name)?;
+    Some((parts.map.name, parts.map.kind))
+}
+
+/// A file name taken apart: `prefix_ALIAS_suffix.extension`; the outer two in lower case.
+struct Parts {
+    prefix: String,
+    map: MapName,
+    suffix: String,
+}
+
+fn is_separator(c: char) -> bool {
+    matches!(c, '_' | '-' | '.' | ' ')
+}
+
+fn parts(file_name: &str) -> Option<Parts> {
+    let stem = Path::new(file_name).file_stem()?.to_str()?.to_lowercase();
+    let words: Vec<&str> = stem.split(is_separator).filter(|word| !word.is_empty()).collect();
+    let is_size = |word: &&&str| {
+        let digits = word.trim_end_matches('k');
+        let size = !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit());
+        size || matches!(**word, "png" | "jpg" | "jpeg" | "exr" | "tif" | "8bit" | "16bit")
+    };
+    let end = words.len() - words.iter().rev().take_while(is_size).count();
+    // The longest alias wins: `normal_gl` before `gl`.
+    (1..=end.min(3)).rev().find_map(|n| {
+        let map = MapName::of_alias(&words[end - n..end].concat())?;
+        Some(Parts { prefix: words[..end - n].join("_"), map, suffix: words[end..].join("_") })
+    })
+}
+
+/// A map found beside a photo.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Sibling {
+    /// Which map, as [`MapName::name`].
+    pub name: &'static str,
+    /// What its numbers are.
+    pub kind: MapKind,
+    /// The file.
+    pub path: PathBuf,
+}
+
+/// The maps in the photo's folder that belong to it, sorted by name.
+///
+/// If the photo's name ends in an alias of the base color (`wall_albedo.jpg`, `basecolor.jpg`),
+/// these are the files with the same name but another alias; otherwise the files that carry an
+/// alias behind the photo's whole name and a separator (`photo.jpg`, `photo_normal.png`). Case
+/// does not matter. If several files claim the same map, the most exact format wins (EXR, TIFF,
+/// PNG, others).
+///
+/// # Errors
+/// [`Error::Io`](crate::Error::Io) if the folder cannot be listed.
+pub fn siblings(photo: &Path) -> Result<Vec<Sibling>> {
+    let Some(photo_name) = photo.file_name().and_then(|name| name.to_str()) else {
+        return Ok(Vec::new());
+    };
+    let (prefix, suffix) = match parts(photo_name) {
+        Some(parts) if parts.map.name == BASE => (parts.prefix, parts.suffix),
+        _ => {
+            let stem = Path::new(photo_name).file_stem().unwrap_or_default().to_string_lossy();
+            let stem = stem.to_lowercase();
+            let words: Vec<&str> = stem.split(is_separator).filter(|w| !w.is_empty()).collect();
+            if words.is_empty() {
+                return Ok(Vec::new());
+            }
+            (words.join("_"), String::new())
+        }
+    };
+    let mut found = Vec::new();
+    for path in files_beside(photo)? {
+        let Some(name) = path.file_name().and_then(|name| name.to_str()) else { continue };
+        let Some(parts) = parts(name) else { continue };
+        if name != photo_name
+            && parts.map.name != BASE
+            && (&parts.prefix, &parts.suffix) == (&prefix, &suffix)
+        {
+            found.push(Sibling { name: parts.map.name, kind: parts.map.kind, path });
+        }
+    }
+    let exactness = |path: &Path| {
+        let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+        ["exr", "tif", "tiff", "png"].iter().position(|e| extension == *e).unwrap_or(usize::MAX)
+    };
+    found.sort_by(|a, b| {
+        let key = |s: &Sibling| (s.name, exactness(&s.path), s.path.clone());
+        key(a).cmp(&key(b))
+    });
+    found.dedup_by_key(|sibling| sibling.name);
+    Ok(found)
+}
+
+/// Gives every normal unit length. Vectors whose length is unit but for the rounding of their
+/// storage keep their bits, so the function is idempotent; so do vectors that are zero but for
+/// that rounding (undefined normals) and those with NaN.
 ///
 /// The first three channels are the vector; others pass through.
 ///
@@ -35,18 +187,204 @@ pub fn renormalize(picture: Picture) -> Result<Picture> {
     picture.with_samples(h, w, c, samples)
 }
 
+/// Distance of neighbouring values of the type in its upper half range.
+fn storage_step<T: Sample>() -> f64 {
+    match size_of::<T>() {
+        _ if T::SCALE > 1.0 => 1.0 / T::SCALE,
+        2 => 1.0 / 2048.0,
+        _ => 1e-6,
+    }
+}
+
 fn renormalize_pixel<T: Sample>(pixel: &mut [T]) {
     let n: [f64; 3] = std::array::from_fn(|k| pixel[k].to_unit() * 2.0 - 1.0);
     let length = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
-    if !(length > 0.0 && length.is_finite()) {
-        return;
-    }
-    // A component moves by at most |length - 1|; in storage half of that.
-    let step = if T::SCALE > 1.0 { 1.0 / T::SCALE } else { 1e-6 };
-    if (length - 1.0).abs() / 2.0 <= step {
+    // Rounding moves a stored component by half a step at most, so a component of the vector by
+    // one, and the length by sqrt(3).
+    let rounding = 2.0 * storage_step::<T>();
+    if !length.is_finite() || length <= rounding || (length - 1.0).abs() <= rounding {
         return;
     }
     for k in 0..3 {
         pixel[k] = T::from_unit((n[k] / length + 1.0) / 2.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::picture::{Encoding, Samples};
+    use half::f16;
+    use proptest::prelude::*;
+
+    #[test]
+    fn names_are_classified_by_their_last_words() {
+        use MapKind::{Color, Data, Normal};
+        for (file, want) in [
+            ("foo_normal_gl.png", Some(("normal_gl", Normal))),
+            ("Foo_NormalGL.jpg", Some(("normal_gl", Normal))),
+            ("foo_nor_gl_4k.exr", Some(("normal_gl", Normal))),
+            ("normal_dx.jpg", Some(("normal_dx", Normal))),
+            ("foo-nrm.png", Some(("normal", Normal))),
+            ("ground054_2K_Color.jpg", Some(("basecolor", Color))),
+            ("Ground054_2K-JPG_Displacement.jpg", Some(("height", Data))),
+            ("basecolor.jpg", Some(("basecolor", Color))),
+            ("Wall_Base_Color.tga", Some(("basecolor", Color))),
+            ("wall_ambient_occlusion.png", Some(("ao", Data))),
+            ("wall.bump.tif", Some(("height", Data))),
+            ("wall roughness.png", Some(("roughness", Data))),
+            ("wall_arm_2048.png", Some(("arm", Data))),
+            ("wall_ORM.png", Some(("orm", Data))),
+            ("lamp_emissive.png", Some(("emission", Color))),
+            ("watercolor.jpg", None),
+            ("normal_map_of_norway.jpg", None),
+            ("photo.jpg", None),
+            ("4k.jpg", None),
+            ("", None),
+            ("_.png", None),
+        ] {
+            assert_eq!(classify(file), want, "{file}");
+        }
+    }
+
+    #[test]
+    fn no_alias_means_two_maps_and_the_table_is_sorted() {
+        let mut aliases: Vec<_> = MapName::ALL.iter().flat_map(|m| m.aliases).collect();
+        let n = aliases.len();
+        aliases.sort_unstable();
+        aliases.dedup();
+        assert_eq!(aliases.len(), n, "every alias once");
+        assert!(MapName::ALL.is_sorted_by_key(|m| m.name), "by name");
+    }
+
+    fn found(files: &[&str], photo: &str) -> Vec<(String, String)> {
+        let dir = tempfile::tempdir().expect("folder");
+        for file in files {
+            std::fs::write(dir.path().join(file), b"").expect("file");
+        }
+        std::fs::create_dir(dir.path().join("photo_height.png")).expect("a folder is no map");
+        let found = siblings(&dir.path().join(photo)).expect("list");
+        let name = |s: &Sibling| s.path.file_name().expect("name").to_string_lossy().into_owned();
+        found.iter().map(|s| (s.name.to_owned(), name(s))).collect()
+    }
+
+    fn pairs(list: &[(&str, &str)]) -> Vec<(String, String)> {
+        list.iter().map(|(a, b)| ((*a).to_owned(), (*b).to_owned())).collect()
+    }
+
+    #[test]
+    fn a_folder_of_bare_map_names_is_one_material() {
+        let files = [
+            "ao.jpg",
+            "basecolor.jpg",
+            "height.jpg",
+            "normal_dx.jpg",
+            "normal_gl.jpg",
+            "roughness.jpg",
+            "other_height.jpg",
+            "readme_height.txt",
+        ];
+        let want = pairs(&[
+            ("ao", "ao.jpg"),
+            ("height", "height.jpg"),
+            ("normal_dx", "normal_dx.jpg"),
+            ("normal_gl", "normal_gl.jpg"),
+            ("roughness", "roughness.jpg"),
+        ]);
+        assert_eq!(found(&files, "basecolor.jpg"), want);
+        let fabric = ["arm.jpg", "basecolor.jpg", "normal_gl.jpg"];
+        let want = pairs(&[("arm", "arm.jpg"), ("normal_gl", "normal_gl.jpg")]);
+        assert_eq!(found(&fabric, "basecolor.jpg"), want);
+    }
+
+    #[test]
+    fn stems_and_sizes_must_agree() {
+        let files = [
+            "Wall_Albedo_4k.jpg",
+            "wall_nor_gl_4k.exr",
+            "wall_rough_2k.png",
+            "wall2_rough_4k.png",
+            "wall_disp_4k.jpg",
+            "wall_disp_4k.tif",
+            "wall_col_4k.png",
+        ];
+        let want = pairs(&[("height", "wall_disp_4k.tif"), ("normal_gl", "wall_nor_gl_4k.exr")]);
+        assert_eq!(found(&files, "Wall_Albedo_4k.jpg"), want);
+    }
+
+    #[test]
+    fn a_plain_photo_takes_what_carries_its_whole_name() {
+        let files = [
+            "photo.jpg",
+            "photo_normal.png",
+            "photograph_ao.png",
+            "photo2_ao.png",
+            "normal.png",
+            "photo_tile.png",
+            "photoheight.png",
+            "photo_albedo.png",
+        ];
+        assert_eq!(found(&files, "photo.jpg"), pairs(&[("normal", "photo_normal.png")]));
+        assert_eq!(found(&["rusty_metal.jpg", "rusty_rough.jpg"], "rusty_metal.jpg"), []);
+        assert_eq!(found(&["a.jpg", "b_normal.jpg"], "a.jpg"), []);
+    }
+
+    fn length(pixel: &[f64]) -> f64 {
+        pixel.iter().map(|v| (v * 2.0 - 1.0).powi(2)).sum::<f64>().sqrt()
+    }
+
+    fn check<T: Sample + std::fmt::Debug>(pixel: [f64; 3]) {
+        let stored: Vec<T> = pixel.iter().map(|v| T::from_unit(*v)).collect();
+        let units = |s: &Samples| (0..3).map(|i| s.unit(i)).collect::<Vec<f64>>();
+        let before = T::wrap(stored);
+        let picture = Picture::new(1, 1, 3, before.clone(), Encoding::Data).expect("picture");
+        let once = renormalize(picture).expect("once");
+        let step = 2.0 * storage_step::<T>();
+        if length(&units(&before)) > step {
+            let after = length(&units(once.samples()));
+            assert!((after - 1.0).abs() <= step, "length {after}");
+        } else {
+            assert_eq!(once.samples(), &before, "undefined normals stay");
+        }
+        let twice = renormalize(once.clone()).expect("twice");
+        assert_eq!(once, twice, "unit vectors keep their bits");
+    }
+
+    proptest! {
+        #[test]
+        fn normals_come_out_with_unit_length(x in 0.0..=1.0, y in 0.0..=1.0, z in 0.0..=1.0) {
+            let pixel = [x, y, z];
+            check::<u8>(pixel);
+            check::<u16>(pixel);
+            check::<f16>(pixel);
+            check::<f32>(pixel);
+            check::<f64>(pixel);
+        }
+
+        #[test]
+        fn stored_unit_vectors_keep_their_bits(a in 0.0..std::f64::consts::TAU, z in -1.0..=1.0_f64) {
+            let r = (1.0 - z * z).sqrt();
+            let n = [r * a.cos(), r * a.sin(), z].map(|v| (v + 1.0) / 2.0);
+            let bits = n.map(u8::from_unit).to_vec();
+            let picture = Picture::new(1, 1, 3, Samples::U8(bits.clone()), Encoding::Data).expect("u8");
+            prop_assert_eq!(renormalize(picture).expect("u8").into_samples(), Samples::U8(bits));
+            let bits = n.map(f16::from_f64).to_vec();
+            let picture = Picture::new(1, 1, 3, Samples::F16(bits.clone()), Encoding::Data).expect("f16");
+            prop_assert_eq!(renormalize(picture).expect("f16").into_samples(), Samples::F16(bits));
+        }
+    }
+
+    #[test]
+    fn undefined_and_further_channels_pass() {
+        let v = vec![128, 128, 128, 7, 127, 128, 127, 8, 255, 255, 128, 9];
+        let picture = Picture::new(1, 3, 4, Samples::U8(v), Encoding::Data).expect("picture");
+        let want = vec![128, 128, 128, 7, 127, 128, 127, 8, 218, 218, 128, 9];
+        assert_eq!(renormalize(picture).expect("run").into_samples(), Samples::U8(want));
+        let nan = Samples::F32(vec![f32::NAN, 0.5, 1.0]);
+        let picture = Picture::new(1, 1, 3, nan, Encoding::Data).expect("picture");
+        let Samples::F32(out) = renormalize(picture).expect("run").into_samples() else {
+            panic!("type kept")
+        };
+        assert!(out[0].is_nan() && out[1..] == [0.5, 1.0]);
     }
 }

@@ -17,7 +17,11 @@ use crate::image::sourcemap::SourceMap;
 use crate::with_samples;
 
 /// Fills a new vector of `len` items from the bytes of a buffer.
-fn copied<T: bytemuck::Pod>(py: Python<'_>, buffer: &Bound<'_, PyAny>, len: usize) -> PyResult<Vec<T>> {
+fn copied<T: bytemuck::Pod>(
+    py: Python<'_>,
+    buffer: &Bound<'_, PyAny>,
+    len: usize,
+) -> PyResult<Vec<T>> {
     let bytes = (len as u64).checked_mul(size_of::<T>() as u64);
     memory::ensure_available("copying the array", bytes).into_py(py)?;
     let mut items = bytemuck::zeroed_vec::<T>(len);

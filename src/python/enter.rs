@@ -64,6 +64,14 @@ pub(super) fn enter<T: Send + 'static>(
     }
 }
 
+/// As [`enter`], for work that counts no steps: Ctrl-C is heard when it is done.
+pub(super) fn unheard<T: Send + 'static>(
+    py: Python<'_>,
+    work: impl FnOnce() -> Result<T> + Send + 'static,
+) -> PyResult<T> {
+    enter(py, &Arc::default(), None, work)
+}
+
 fn guarded<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
         let message = panic

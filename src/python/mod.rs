@@ -8,14 +8,16 @@ mod enter;
 mod error;
 
 use std::ffi::OsString;
+use std::path::PathBuf;
 
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyBytes, PyDict};
 
-use crate::base::ctx::{Ctx, Job};
+use crate::base::ctx::Ctx;
 use crate::base::error::{Error, ErrorKind, Result};
+use crate::image::io::{self, Format, WriteOptions};
 use crate::image::mask::Mask;
-use crate::image::material::MapKind;
+use crate::image::material::{self, MapKind};
 use crate::image::picture::Picture;
 use crate::image::sourcemap::SourceMap;
 use crate::verb::tile::TileParams;
@@ -48,7 +50,10 @@ fn ensure_same_shape(name: &str, map: &Picture, photo: &Picture) -> Result<()> {
 
 /// Makes a tile. Returns the picture, the source map, the gathered maps and the report as JSON.
 #[pyfunction]
-#[expect(clippy::too_many_arguments, reason = "one private caller, in _api.py, passes them by name")]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "one private caller, in _api.py, passes them by name"
+)]
 #[expect(clippy::type_complexity, reason = "one private caller, in _api.py, names its parts")]
 #[pyo3(signature = (*, photo, mask, maps, params, seed, threads, progress))]
 fn tile<'py>(
@@ -112,15 +117,74 @@ fn apply<'py>(
     let kind = kind_named(kind).into_py(py)?;
     let source_map = source_map.source_map(py)?;
     let picture = picture.picture(py)?;
-    let job = std::sync::Arc::<Job>::default();
-    let out = enter::enter(py, &job, None, move || source_map.apply(&picture, kind))?;
+    let out = enter::unheard(py, move || source_map.apply(&picture, kind))?;
     array_out(py, &out)
+}
+
+/// Reads a picture.
+#[pyfunction]
+#[pyo3(signature = (*, path, kind))]
+fn read<'py>(py: Python<'py>, path: PathBuf, kind: &str) -> PyResult<ArrayOut<'py>> {
+    let kind = kind_named(kind).into_py(py)?;
+    let picture = enter::unheard(py, move || io::read(&path, kind))?;
+    array_out(py, &picture)
+}
+
+/// Writes a picture.
+#[pyfunction]
+#[pyo3(signature = (*, path, picture, kind, record, overwrite))]
+fn write<'py>(
+    py: Python<'py>,
+    path: PathBuf,
+    picture: ArrayIn<'py>,
+    kind: &str,
+    record: Option<String>,
+    overwrite: bool,
+) -> PyResult<()> {
+    let options = WriteOptions { kind: kind_named(kind).into_py(py)?, record, force: overwrite };
+    let picture = picture.picture(py)?;
+    enter::unheard(py, move || io::write(&path, &picture, &options))
+}
+
+/// The bytes of a PNG file of the picture.
+#[pyfunction]
+#[pyo3(signature = (*, picture))]
+fn encode_png<'py>(py: Python<'py>, picture: ArrayIn<'py>) -> PyResult<Bound<'py, PyBytes>> {
+    let picture = picture.picture(py)?;
+    let options = WriteOptions::new(MapKind::Color);
+    let bytes = enter::unheard(py, move || io::encode(&picture, Format::Png, &options))?;
+    Ok(PyBytes::new(py, &bytes))
+}
+
+/// Reads a source map.
+#[pyfunction]
+#[pyo3(signature = (*, path))]
+fn read_source_map(py: Python<'_>, path: PathBuf) -> PyResult<MapOut<'_>> {
+    let map = enter::unheard(py, move || io::read_source_map(&path))?;
+    map_out(py, &map)
+}
+
+/// Writes a source map.
+#[pyfunction]
+#[pyo3(signature = (*, path, source_map, overwrite))]
+fn write_source_map<'py>(
+    py: Python<'py>,
+    path: PathBuf,
+    source_map: MapIn<'py>,
+    overwrite: bool,
+) -> PyResult<()> {
+    let map = source_map.source_map(py)?;
+    enter::unheard(py, move || io::write_source_map(&path, &map, overwrite))
 }
 
 /// What the numbers of a material's map of this name are.
 #[pyfunction]
 fn map_kind(name: &str) -> &'static str {
-    if name.contains("nor") { "normal" } else { "data" }
+    match material::classify(name) {
+        Some((_, MapKind::Color)) => "color",
+        Some((_, MapKind::Normal)) => "normal",
+        Some((_, MapKind::Data)) | None => "data",
+    }
 }
 
 /// Every parameter of `tile`, with its default as text.
@@ -149,8 +213,7 @@ fn error_kinds() -> Vec<&'static str> {
 /// Fails inside the doorway with an error of this kind (`internal`: panics); for the tests.
 #[pyfunction]
 fn fail(py: Python<'_>, kind: String) -> PyResult<()> {
-    let job = std::sync::Arc::<Job>::default();
-    enter::enter(py, &job, None, move || error::example(&kind))
+    enter::unheard(py, move || error::example(&kind))
 }
 
 /// Runs the command line; returns the exit status.
@@ -164,7 +227,10 @@ fn cli_main(py: Python<'_>, args: Vec<OsString>) -> u8 {
 #[pymodule(gil_used = false)]
 mod _texforge {
     #[pymodule_export]
-    use super::{apply, cli_main, error_kinds, fail, map_kind, schema, tile};
+    use super::{
+        apply, cli_main, encode_png, error_kinds, fail, map_kind, read, read_source_map, schema,
+        tile, write, write_source_map,
+    };
 
     use pyo3::prelude::*;
 

@@ -1,0 +1,124 @@
+//! [`write`] and [`encode`]: a picture becomes a file, or is refused with a reason.
+
+use std::borrow::Cow;
+use std::path::Path;
+
+use super::place::{known_extension, put};
+use super::{Format, exr, jpeg, other, png, tiff, unnamed};
+use crate::base::error::{Error, Result};
+use crate::image::color::srgb_from_linear;
+use crate::image::material::MapKind;
+use crate::image::picture::{Encoding, Picture, Sample, Samples};
+
+/// How a picture is written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct WriteOptions {
+    /// What the picture's numbers are; colors are marked as such in the file, data never is.
+    pub kind: MapKind,
+    /// How the picture was made, one line of JSON; kept in the file under the name `texforge`
+    /// (PNG text, EXR attribute, JPEG comment, TIFF software tag; the others have no place).
+    pub record: Option<String>,
+    /// Whether an existing file may be replaced.
+    pub force: bool,
+}
+
+impl WriteOptions {
+    /// No record, nothing overwritten.
+    pub fn new(kind: MapKind) -> Self {
+        Self { kind, record: None, force: false }
+    }
+}
+
+/// Writes a picture to `path`, in the format that its extension names, whole or not at all.
+///
+/// What the format cannot hold is refused: 16 bits in JPEG, WebP, BMP and TGA; floats anywhere but
+/// in EXR and TIFF (PNG takes them as 16 bits if they all lie in 0..=1), transparency in JPEG,
+/// linear integers anywhere but in PNG and EXR. EXR takes everything: integer colors as linear
+/// light, integer data as `v / full scale`, doubles rounded to single floats.
+///
+/// # Determinism
+/// Same picture, same options: same bytes.
+///
+/// # Errors
+/// [`Error::Format`] (unknown extension, or the format cannot hold the picture), [`Error::Exists`],
+/// [`Error::Io`].
+pub fn write(path: &Path, picture: &Picture, options: &WriteOptions) -> Result<()> {
+    let bytes = encode_for(path, picture, known_extension(path)?, options)?;
+    put(path, &bytes, options.force)
+}
+
+/// The bytes that [`write`] would write in this format; for standard output and notebooks.
+///
+/// # Errors
+/// [`Error::Format`].
+pub fn encode(picture: &Picture, format: Format, options: &WriteOptions) -> Result<Vec<u8>> {
+    encode_for(&unnamed(), picture, format, options)
+}
+
+fn encode_for(
+    path: &Path,
+    picture: &Picture,
+    format: Format,
+    options: &WriteOptions,
+) -> Result<Vec<u8>> {
+    let mut picture = Cow::Borrowed(picture);
+    if options.kind != MapKind::Color && picture.encoding != Encoding::Data {
+        picture.to_mut().encoding = Encoding::Data;
+    }
+    let record = options.record.as_deref().map(plain_line);
+    let record = record.as_deref();
+    let result = match format {
+        Format::Png if picture.samples().is_float() => {
+            sixteen_bits(&picture).and_then(|picture| png::encode(&picture, record))
+        }
+        Format::Png => png::encode(&picture, record),
+        Format::Jpeg => jpeg::encode(&picture, record),
+        Format::Tiff => tiff::encode(&picture, record),
+        Format::Exr => exr::encode(&picture, record),
+        Format::WebP | Format::Bmp | Format::Tga | Format::Pnm => other::encode(&picture, format),
+        Format::Gif => Err("GIF is not written; use .png".into()),
+    };
+    result.map_err(|reason| Error::Format { path: path.to_owned(), reason })
+}
+
+/// A float picture as 16 bits, if nothing but rounding is lost: linear light gets the sRGB curve.
+fn sixteen_bits(picture: &Picture) -> Result<Picture, String> {
+    let (n, c) = (picture.samples().len(), picture.channels());
+    let alpha = picture.alpha_channel();
+    let curved = picture.encoding == Encoding::Linear;
+    let mut out = Vec::with_capacity(n);
+    for i in 0..n {
+        let value = picture.samples().unit(i);
+        if !(0.0..=1.0).contains(&value) {
+            return Err(format!(
+                "a sample is {value}, this format holds 0 to 1 only; use .exr or .tif to keep it"
+            ));
+        }
+        let curved = curved && alpha != Some(i % c);
+        out.push(u16::from_unit(if curved { srgb_from_linear(value) } else { value }));
+    }
+    let mut wide = picture
+        .with_samples(picture.height(), picture.width(), c, Samples::U16(out))
+        .map_err(|e| e.to_string())?;
+    if curved {
+        wide.encoding = Encoding::Srgb;
+    }
+    Ok(wide)
+}
+
+/// One line of ASCII: JSON's own escapes for everything else.
+fn plain_line(record: &str) -> String {
+    let mut line = String::with_capacity(record.len());
+    for c in record.chars() {
+        match c {
+            ' '..='~' => line.push(c),
+            c if c.is_control() => line.push(' '),
+            c => {
+                for unit in c.encode_utf16(&mut [0; 2]) {
+                    line.push_str(&format!("\\u{unit:04x}"));
+                }
+            }
+        }
+    }
+    line
+}
