@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any, Literal
+from collections.abc import Mapping  # noqa: TC003 (the signatures can be resolved at run time)
+from typing import Any, Literal
 
 import numpy as np
+import numpy.typing as npt
 
 from texforge import _arrays, _texforge
 from texforge._errors import ParameterError
@@ -25,11 +27,6 @@ from texforge._types import (
     SourceMap,
     Tile,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    import numpy.typing as npt
 
 __all__ = ["apply", "load_source_map", "read_image", "tile", "write_image"]
 
@@ -79,7 +76,7 @@ def tile(
         Reach of the measure, as a fraction of the tile's shorter side, 0.01 to 1. Smaller evens
         out smaller stains, larger keeps more variety.
     patch : int
-        Side of the patches that are compared, in pixels; odd, 3 to 31. Larger keeps larger
+        Side of the patches that are compared, in pixels; odd, 3 to 21. Larger keeps larger
         features whole, smaller mixes more.
     uniformity : float
         How strongly every part of the photo is made to contribute equally, 0 (not at all) to 100.
@@ -159,8 +156,8 @@ def tile(
     }
     if maps and method == "make-seamless":
         raise ParameterError(
-            "`maps` must be empty with method 'make-seamless', which blends and so has no source "
-            "map to apply to them; choose another method",
+            "`maps` must be empty with method 'make-seamless', which blends and so leaves nothing "
+            f"to apply to other maps, got {', '.join(map(repr, maps))}",
             fields={"name": "maps"},
         )
     others = {name: _map(other, name) for name, other in (maps or {}).items()}

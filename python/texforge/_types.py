@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable  # noqa: TC003 (the aliases can be resolved at run time)
-from os import PathLike  # noqa: TC003 (as above)
+from collections.abc import Callable
+from os import PathLike
 from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias
 
 import numpy as np
@@ -42,7 +42,7 @@ Encoding: TypeAlias = Literal["srgb", "linear", "data"]
 """What the numbers of a picture mean."""
 MapKind: TypeAlias = Literal["color", "data", "normal"]
 """What the numbers of a material's map mean."""
-PathType: TypeAlias = "str | PathLike[str]"
+PathType: TypeAlias = str | PathLike[str]
 """Where a file is."""
 
 
@@ -58,9 +58,9 @@ class _PillowImage(Protocol):
     def __array_interface__(self) -> dict[str, Any]: ...
 
 
-ImageLike: TypeAlias = "npt.ArrayLike | _PillowImage"
+ImageLike: TypeAlias = npt.ArrayLike | _PillowImage
 """Anything that `numpy.asarray` makes a picture of, or a Pillow image."""
-Progress: TypeAlias = "bool | Callable[[float], object] | ProgressBar | None"
+Progress: TypeAlias = bool | Callable[[float], object] | ProgressBar | None
 """What `progress=` may be: see `texforge.tile`."""
 
 

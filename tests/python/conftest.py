@@ -11,6 +11,7 @@ import pytest
 
 if TYPE_CHECKING:
     import numpy.typing as npt
+    import texforge
 
 # The first call in a process is slow; time is judged by nobody here.
 hypothesis.settings.register_profile("default", deadline=None, max_examples=25)
@@ -29,13 +30,13 @@ def noise(
     return np.random.default_rng(seed).integers(0, 256, shape, dtype=np.uint8)
 
 
+def source_map_of(tile: texforge.Tile) -> npt.NDArray[np.int32]:
+    """Return the tile's source map, which it must have."""
+    assert tile.source_map is not None
+    return tile.source_map
+
+
 @pytest.fixture
 def photo() -> npt.NDArray[np.uint8]:
     """Return an RGB picture."""
     return noise()
-
-
-@pytest.fixture
-def quick() -> dict[str, Any]:
-    """Return settings with which a tile takes some hundredths of a second."""
-    return dict(QUICK)
