@@ -1,9 +1,90 @@
-//! The command line.
+//! The command line: what is typed becomes a call of a verb, what comes back becomes files.
+//!
+//! Standard output is data, standard error is for people. Only this room may print, read the
+//! environment or end the process.
+
+mod apply;
+mod args;
+mod exit;
+mod files;
+mod maps;
+mod output;
+mod preview;
+mod show;
+mod small;
+mod tile;
+mod work;
 
 use std::ffi::OsString;
 
-/// Runs the program with these arguments (the first is its name); returns the exit status.
+use clap::error::ErrorKind as Usage;
+
+use crate::base::error::Error;
+
+/// Runs the program with these arguments (the first is its name); returns the exit status:
+/// 0 done, 1 cannot, 2 wrong usage, 130 interrupted.
+///
+/// Ctrl-C, SIGTERM and SIGHUP are caught from the first run on, also when a host program (the
+/// Python wheel's console script) calls this.
 pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
-    let _ = args.into_iter().count();
-    0
+    let matches = match args::command().try_get_matches_from(args) {
+        Ok(matches) => matches,
+        Err(error) => return misunderstood(&error),
+    };
+    let Some((command, matches)) = matches.subcommand() else {
+        return exit::USAGE;
+    };
+    let result = match command {
+        "tile" => tile::run(matches),
+        "apply" => apply::run(matches),
+        "params" => small::params(matches),
+        "info" => small::info(matches),
+        "completions" => small::completions(matches),
+        "man" => small::man(matches),
+        other => Err(Error::Internal { message: format!("command {other} is not connected") }),
+    };
+    match result {
+        Ok(()) => exit::DONE,
+        Err(error) => {
+            if !exit::is_broken_pipe(&error) {
+                tell(&error, command);
+            }
+            exit::status(&error)
+        }
+    }
+}
+
+/// Shows help that was asked for, or what is wrong with what was typed.
+fn misunderstood(error: &clap::Error) -> u8 {
+    match error.kind() {
+        Usage::DisplayHelp | Usage::DisplayVersion => {
+            // A closed pipe is all that can go wrong here, and then nobody reads.
+            let _ = error.print();
+            exit::DONE
+        }
+        Usage::DisplayHelpOnMissingArgumentOrSubcommand => {
+            let _ = error.print();
+            exit::USAGE
+        }
+        _ => {
+            let text = error.render().to_string();
+            let text = text.strip_prefix("error: ").unwrap_or(&text);
+            show::write_line(&format!("texforge: {}", text.trim_end()));
+            exit::USAGE
+        }
+    }
+}
+
+/// One sentence, one hint.
+fn tell(error: &Error, command: &str) {
+    if matches!(error, Error::Cancelled) {
+        show::write_line("texforge: interrupted; nothing was written");
+        return;
+    }
+    // The sentence may quote file names and decoders' messages, which may hold line breaks.
+    let sentence = error.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
+    show::write_line(&format!("texforge: {sentence}"));
+    if let Some(hint) = exit::hint(error, command, &args::flags_of(command)) {
+        show::write_line(&format!("hint: {hint}"));
+    }
 }

@@ -1,0 +1,111 @@
+//! `texforge apply`.
+
+use std::path::{Path, PathBuf};
+
+use clap::ArgMatches;
+use serde_json::json;
+
+use crate::base::error::{Error, Result};
+use crate::cli::files;
+use crate::cli::output::{Target, to_stdout};
+use crate::cli::show::duration;
+use crate::cli::small::{SCHEMA_VERSION, print_json};
+use crate::cli::work::{Session, supervise, watch_signals};
+use crate::image::material::MapKind;
+
+/// What was typed.
+#[derive(Debug)]
+struct Request {
+    source_map: PathBuf,
+    map: PathBuf,
+    target: Target,
+    kind: Option<MapKind>,
+    force: bool,
+}
+
+/// Runs `texforge apply`.
+///
+/// # Errors
+/// Whatever keeps it from being done; then no file was written.
+pub(super) fn run(matches: &ArgMatches) -> Result<()> {
+    let path = |id| matches.get_one::<PathBuf>(id).cloned().unwrap_or_default();
+    let json = matches.get_flag("json");
+    let request = Request {
+        source_map: path("source-map"),
+        map: path("map"),
+        target: Target::typed(&path("output"))?,
+        kind: matches.get_one::<String>("kind").map(|word| match word.as_str() {
+            "color" => MapKind::Color,
+            "normal" => MapKind::Normal,
+            _ => MapKind::Data,
+        }),
+        force: matches.get_flag("force"),
+    };
+    if json && request.target == Target::Stdout {
+        let expected = "left out when the map goes to standard output";
+        return Err(Error::parameter("json", expected, "`-o -`"));
+    }
+    let session = Session::new(std::sync::Arc::default(), matches.get_flag("quiet"));
+    watch_signals();
+    let summary = supervise(&session, move |session| work(session, &request))?;
+    if json { print_json(&summary) } else { Ok(()) }
+}
+
+fn work(session: &Session, request: &Request) -> Result<serde_json::Value> {
+    let target = request.target.file();
+    if let Some(path) = target {
+        files::check_place(path, &[&request.source_map, &request.map], request.force)?;
+    }
+    let kind = request.kind.unwrap_or_else(|| {
+        let kind = files::kind_of_file(&request.map);
+        session.console.say(&format!(
+            "{}: read as {} by its name (--kind says otherwise)",
+            request.map.display(),
+            word(kind)
+        ));
+        kind
+    });
+    let map = files::read(&request.map, kind)?;
+    session.check()?;
+    let source_map = files::read_source_map(&request.source_map)?;
+    session.check()?;
+    let out = source_map.apply(&map, kind)?;
+    let bytes = files::encode(&out, target, kind, None)?;
+    session.check()?;
+    match target {
+        None => to_stdout(&bytes)?,
+        Some(path) => {
+            session.staging.stage(session, path, &bytes)?;
+            session.staging.commit(session, request.force)?;
+        }
+    }
+    let place = target.unwrap_or(Path::new("-"));
+    let elapsed = session.console.elapsed();
+    session.console.say(&format!(
+        "{}  {}x{}, {}",
+        place.display(),
+        out.width(),
+        out.height(),
+        duration(elapsed)
+    ));
+    Ok(json!({
+        "schema_version": SCHEMA_VERSION,
+        "verb": "apply",
+        "version": env!("CARGO_PKG_VERSION"),
+        "kind": word(kind),
+        "path": place.to_string_lossy(),
+        "width": out.width(),
+        "height": out.height(),
+        "seconds": { "total": elapsed.as_secs_f64() },
+        "notes": map.meta.notes,
+    }))
+}
+
+/// The kind as `--kind` spells it.
+fn word(kind: MapKind) -> &'static str {
+    match kind {
+        MapKind::Color => "color",
+        MapKind::Data => "data",
+        MapKind::Normal => "normal",
+    }
+}

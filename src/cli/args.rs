@@ -1,0 +1,277 @@
+//! What may be typed: commands, flags and their help. Flags of parameters come from the schema.
+
+use std::path::PathBuf;
+
+use clap::builder::{PossibleValuesParser, StringValueParser, ValueParser};
+use clap::{Arg, ArgAction, ArgMatches, Command, ValueHint, value_parser};
+
+use crate::base::error::Result;
+use crate::base::params::Param;
+use crate::cli::maps;
+use crate::verb::tile::TileParams;
+
+const TILE_EXAMPLES: &str = "\
+Examples:
+  texforge tile brick.jpg -o brick.png
+  texforge tile brick.jpg -o brick.png --size 1024x1024 --preview
+  texforge tile brick.jpg -o trim.png --axis x --quality best
+  texforge tile scan.png -o wall.png --mask usable.png --map normal=scan_nrm.png
+  texforge tile brick.jpg -o - | display";
+
+const APPLY_EXAMPLES: &str = "\
+Examples:
+  texforge tile brick.jpg -o brick.png --save-source-map brick_source.exr
+  texforge apply brick_source.exr photo_normal.png -o brick_normal.png
+  texforge apply brick_source.exr photo_wetness.png -o brick_wetness.png --kind data";
+
+/// The whole command line.
+pub(super) fn command() -> Command {
+    Command::new("texforge")
+        .version(env!("CARGO_PKG_VERSION"))
+        .about("Turns photographs into textures that can be used.")
+        .before_help(
+            "Examples:\n  texforge tile brick.jpg -o brick.png\n  texforge tile --help\n  \
+             texforge info brick.png",
+        )
+        .after_help(
+            "Exit status: 0 done, 1 cannot, 2 wrong usage, 130 interrupted. Results go to standard \
+             output,\nmessages to standard error.",
+        )
+        .subcommand_required(true)
+        .arg_required_else_help(true)
+        .subcommand(tile())
+        .subcommand(apply())
+        .subcommand(
+            Command::new("params")
+                .about("Lists the parameters of a command: meaning, default, range.")
+                .before_help("Examples:\n  texforge params tile\n  texforge params tile --json")
+                .arg(Arg::new("verb").value_name("COMMAND").value_parser(["tile"]).help("Only this command's"))
+                .arg(json()),
+        )
+        .subcommand(
+            Command::new("info")
+                .about("Says what a picture file holds: size, sample type, encoding, how it was made.")
+                .before_help("Examples:\n  texforge info tile.png\n  texforge info tile.png --json")
+                .arg(file("file", "FILE", "The picture").required(true))
+                .arg(json()),
+        )
+        .subcommand(
+            Command::new("completions")
+                .about("Writes the tab completions of a shell to standard output.")
+                .before_help(
+                    "Examples:\n  texforge completions bash > ~/.local/share/bash-completion/completions/texforge\n  \
+                     texforge completions zsh > ~/.zfunc/_texforge",
+                )
+                .arg(
+                    Arg::new("shell")
+                        .value_name("SHELL")
+                        .required(true)
+                        .value_parser(value_parser!(clap_complete::Shell))
+                        .help("The shell"),
+                ),
+        )
+        .subcommand(
+            Command::new("man")
+                .about("Writes the manual page to standard output.")
+                .before_help("Examples:\n  texforge man | man -l -\n  texforge man tile > texforge-tile.1")
+                .arg(
+                    Arg::new("verb")
+                        .value_name("COMMAND")
+                        .value_parser(["tile", "apply", "params", "info", "completions"])
+                        .help("The page of this command"),
+                ),
+        )
+}
+
+fn tile() -> Command {
+    Command::new(TileParams::VERB)
+        .about("Turns a photo into a stationary tile: no seam, and no blob that gives the repetition away.")
+        .before_help(TILE_EXAMPLES)
+        .arg(file("photo", "PHOTO", "The photo: PNG, JPEG, TIFF, WebP, EXR and others").required(true))
+        .arg(
+            file("output", "TILE", "The tile to write; the extension chooses the format. `-`: PNG to standard output")
+                .short('o')
+                .long("output")
+                .required(true),
+        )
+        .args(TileParams::schema().into_iter().map(flag))
+        .next_help_heading("Inputs")
+        .arg(
+            file("mask", "FILE", "Picture of the photo's size: white where the photo may be used")
+                .long("mask"),
+        )
+        .arg(
+            Arg::new("map")
+                .long("map")
+                .value_name("NAME=FILE")
+                .action(ArgAction::Append)
+                .value_parser(ValueParser::os_string())
+                .help(format!(
+                    "A further map of the same surface that follows the tile pixel by pixel; may be \
+                     repeated. NAME is one of {}. Maps whose file name is the photo's with such an \
+                     ending are taken by themselves",
+                    maps::known_names()
+                )),
+        )
+        .arg(switch("no-maps", "Leave alone the maps that lie beside the photo"))
+        .next_help_heading("Outputs")
+        .arg(
+            file("save-source-map", "FILE.exr", "Also write which photo pixel each tile pixel is, for `texforge apply`")
+                .long("save-source-map"),
+        )
+        .arg(switch("preview", "Also write a 3x3 tiling, as TILE.preview.png beside the tile"))
+        .arg(switch("force", "Overwrite outputs that exist already"))
+        .arg(json())
+        .arg(switch("quiet", "Say nothing but errors").short('q'))
+        .next_help_heading("Running")
+        .arg(
+            Arg::new("seed")
+                .long("seed")
+                .value_name("N")
+                .default_value("0")
+                .value_parser(value_parser!(u64))
+                .allow_negative_numbers(true)
+                .help("Seed of all random choices; the same seed gives the same pixels on any machine"),
+        )
+        .arg(
+            Arg::new("threads")
+                .long("threads")
+                .value_name("N")
+                .default_value("0")
+                .value_parser(value_parser!(usize))
+                .allow_negative_numbers(true)
+                .help("Worker threads, 0 for one per core; changes the speed, never the result"),
+        )
+}
+
+fn apply() -> Command {
+    Command::new("apply")
+        .about("Makes the map that fits a tile out of a map that fits its photo, by the tile's source map.")
+        .before_help(APPLY_EXAMPLES)
+        .arg(file("source-map", "SOURCE_MAP", "Source map written by --save-source-map").required(true))
+        .arg(file("map", "MAP", "The map: shows what the photo shows, at any resolution").required(true))
+        .arg(
+            file("output", "OUT", "The file to write; `-`: PNG to standard output")
+                .short('o')
+                .long("output")
+                .required(true),
+        )
+        .arg(
+            Arg::new("kind")
+                .long("kind")
+                .value_name("KIND")
+                .value_parser(["color", "data", "normal"])
+                .help("What the map's numbers are; without it the file's name decides"),
+        )
+        .arg(switch("force", "Overwrite an output that exists already"))
+        .arg(json())
+        .arg(switch("quiet", "Say nothing but errors").short('q'))
+}
+
+/// The flag of one parameter.
+fn flag(param: Param) -> Arg {
+    let mut facts = Vec::new();
+    if !param.range.is_empty() {
+        facts.push(param.range);
+    }
+    if !param.unit.is_empty() {
+        facts.push(param.unit.to_owned());
+    }
+    let mut help = param.doc;
+    if !facts.is_empty() {
+        help = format!("{help} [{}]", facts.join(", "));
+    }
+    let parser: ValueParser = if param.choices.is_empty() {
+        StringValueParser::new().into()
+    } else {
+        PossibleValuesParser::new(param.choices).into()
+    };
+    let value_name = match param.kind {
+        "size" => "WxH",
+        "choice" => "WORD",
+        _ => "N",
+    };
+    Arg::new(param.name)
+        .long(param.name.replace('_', "-"))
+        .value_name(value_name)
+        .default_value(param.default)
+        .value_parser(parser)
+        // A negative number is out of range, not an unknown flag.
+        .allow_negative_numbers(true)
+        .help_heading("Parameters")
+        .help(help)
+}
+
+/// The tile's parameters as typed, checked one by one.
+pub(super) fn tile_params(matches: &ArgMatches) -> Result<TileParams> {
+    let mut params = TileParams::default();
+    for param in TileParams::schema() {
+        if let Some(text) = matches.get_one::<String>(param.name) {
+            params.set(param.name, text)?;
+        }
+    }
+    params.validate()?;
+    Ok(params)
+}
+
+fn file(id: &'static str, value_name: &'static str, help: &'static str) -> Arg {
+    Arg::new(id)
+        .value_name(value_name)
+        .value_parser(value_parser!(PathBuf))
+        .value_hint(ValueHint::FilePath)
+        .help(help)
+}
+
+fn switch(name: &'static str, help: &'static str) -> Arg {
+    Arg::new(name).long(name).action(ArgAction::SetTrue).help(help)
+}
+
+fn json() -> Arg {
+    switch("json", "Write one JSON object to standard output")
+}
+
+/// The long flags of a command, for hints.
+pub(super) fn flags_of(command: &str) -> Vec<String> {
+    self::command()
+        .find_subcommand(command)
+        .map(|c| c.get_arguments().filter_map(|a| a.get_long().map(str::to_owned)).collect())
+        .unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_well_formed() {
+        command().debug_assert();
+    }
+
+    #[test]
+    fn no_flags_mean_the_default_parameters() {
+        let matches = command().get_matches_from(["texforge", "tile", "a.jpg", "-o", "b.png"]);
+        let (_, tile) = matches.subcommand().expect("tile");
+        assert_eq!(tile_params(tile).expect("defaults are valid"), TileParams::default());
+    }
+
+    #[test]
+    fn every_parameter_has_a_flag_and_every_help_begins_with_examples() {
+        let flags = flags_of("tile");
+        for param in TileParams::schema() {
+            assert!(flags.contains(&param.name.replace('_', "-")), "{}", param.name);
+        }
+        for sub in command().get_subcommands_mut() {
+            let help = sub.render_long_help().to_string();
+            assert!(help.starts_with("Examples:"), "{help}");
+        }
+    }
+
+    #[test]
+    fn values_out_of_range_name_the_parameter() {
+        let matches =
+            command().get_matches_from(["texforge", "tile", "a", "-o", "b", "--patch", "-4"]);
+        let (_, tile) = matches.subcommand().expect("tile");
+        let error = tile_params(tile).expect_err("negative");
+        assert!(error.to_string().starts_with("`patch` must be"), "{error}");
+    }
+}

@@ -1,0 +1,143 @@
+//! The further maps of a material: which files they are, what they are called, where they go.
+
+use std::ffi::{OsStr, OsString};
+use std::path::{Path, PathBuf};
+
+use crate::base::error::{Error, Result};
+use crate::cli::files;
+use crate::image::material::{MapKind, MapName};
+use crate::image::picture::Picture;
+use crate::image::sourcemap::SourceMap;
+
+/// A map as asked for.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Wanted {
+    /// Its name, e.g. `normal`; ends the output's file name.
+    pub(super) name: &'static str,
+    /// The file.
+    pub(super) path: PathBuf,
+    /// What its numbers are.
+    pub(super) kind: MapKind,
+    /// Whether it was found beside the photo rather than typed.
+    pub(super) found: bool,
+}
+
+/// The maps typed as NAME=FILE.
+///
+/// # Errors
+/// [`Error::Parameter`] for a missing `=`, an unknown name, a name given twice.
+pub(super) fn typed<'a>(specs: impl Iterator<Item = &'a OsString>) -> Result<Vec<Wanted>> {
+    let mut maps: Vec<Wanted> = Vec::new();
+    for spec in specs {
+        let shown = || format!("`{}`", spec.to_string_lossy());
+        let Some((name, path)) = split(spec) else {
+            return Err(Error::parameter("map", "NAME=FILE, e.g. normal=brick_nrm.png", shown()));
+        };
+        let Some(MapName { name, kind, .. }) = files::map_of_name(&name) else {
+            let expected = format!("NAME=FILE where NAME is one of {}", known_names());
+            return Err(Error::parameter("map", expected, shown()));
+        };
+        if maps.iter().any(|m| m.name == name) {
+            let expected = format!("given once per map, but {name} comes twice");
+            return Err(Error::parameter("map", expected, shown()));
+        }
+        maps.push(Wanted { name, path, kind, found: false });
+    }
+    Ok(maps)
+}
+
+/// The names that maps go by, for messages.
+pub(super) fn known_names() -> String {
+    MapName::ALL.map(|map| map.name).join(", ")
+}
+
+/// Splits at the first `=`; both sides must hold something.
+fn split(spec: &OsStr) -> Option<(String, PathBuf)> {
+    let (name, path) = split_os(spec)?;
+    (!name.is_empty() && !path.is_empty()).then(|| (name, path.into()))
+}
+
+#[cfg(unix)]
+fn split_os(spec: &OsStr) -> Option<(String, OsString)> {
+    use std::os::unix::ffi::OsStrExt as _;
+    let bytes = spec.as_bytes();
+    let at = bytes.iter().position(|&b| b == b'=')?;
+    let name = std::str::from_utf8(&bytes[..at]).ok()?.to_owned();
+    Some((name, OsStr::from_bytes(&bytes[at + 1..]).to_owned()))
+}
+
+#[cfg(not(unix))]
+fn split_os(spec: &OsStr) -> Option<(String, OsString)> {
+    let (name, path) = spec.to_str()?.split_once('=')?;
+    Some((name.to_owned(), path.into()))
+}
+
+/// Fails unless a map of this size can follow a source map of a photo of that size.
+///
+/// The rule is [`SourceMap::apply`]'s own: one pixel is gathered.
+pub(super) fn ensure_fits(map: &Picture, photo: &Picture, wanted: &Wanted) -> Result<()> {
+    let probe = SourceMap::new((1, 1), (photo.height(), photo.width()), vec![[0, 0]])?;
+    probe.apply(map, wanted.kind).map(|_| ()).map_err(|error| match error {
+        Error::SizeMismatch { got_w, got_h, want_w, want_h, remedy, .. } => Error::SizeMismatch {
+            what: format!("the map `{}` ({})", wanted.name, wanted.path.display()),
+            got_w,
+            got_h,
+            want_w,
+            want_h,
+            remedy,
+        },
+        other => other,
+    })
+}
+
+/// Where a map of `tile` goes: `brick.png` and `normal` make `brick_normal.png`, and so does
+/// `brick_basecolor.png`. Integers become PNG, floats EXR, as both keep every bit.
+pub(super) fn output_path(tile: &Path, name: &str, map: &Picture) -> PathBuf {
+    let extension = if map.samples().is_float() { "exr" } else { "png" };
+    let stem = tile.file_stem().unwrap_or_default();
+    let stem = stem.to_str().map_or(stem, |s| OsStr::new(files::without_color_ending(s)));
+    let mut file = stem.to_owned();
+    if !file.is_empty() {
+        file.push("_");
+    }
+    file.push(format!("{name}.{extension}"));
+    tile.with_file_name(file)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::picture::{Encoding, Samples};
+
+    fn specs(specs: &[&str]) -> Result<Vec<Wanted>> {
+        let specs: Vec<OsString> = specs.iter().map(Into::into).collect();
+        typed(specs.iter())
+    }
+
+    #[test]
+    fn the_first_equals_sign_splits() {
+        let maps = specs(&["normal=a=b.png", "roughness=r.png"]).expect("maps");
+        assert_eq!(maps[0].path, Path::new("a=b.png"));
+        assert_eq!((maps[0].kind, maps[1].kind), (MapKind::Normal, MapKind::Data));
+    }
+
+    #[test]
+    fn senseless_maps_are_refused() {
+        for bad in [&["normal"][..], &["=a.png"], &["normal="], &["blorb=a.png"]] {
+            assert!(matches!(specs(bad), Err(Error::Parameter { name: "map", .. })), "{bad:?}");
+        }
+        let error = specs(&["normal=a.png", "nrm=b.png"]).expect_err("twice");
+        assert!(error.to_string().contains("twice"), "{error}");
+    }
+
+    #[test]
+    fn outputs_are_named_after_the_tile() {
+        let of = |samples| Picture::new(1, 1, 1, samples, Encoding::Data).expect("picture");
+        let (int, float) = (of(Samples::U16(vec![7])), of(Samples::F32(vec![0.5])));
+        let name = |tile: &str, map| output_path(Path::new(tile), "normal", map);
+        assert_eq!(name("x/brick.png", &int), Path::new("x/brick_normal.png"));
+        assert_eq!(name("x/brick.tif", &float), Path::new("x/brick_normal.exr"));
+        assert_eq!(name("brick_basecolor.png", &int), Path::new("brick_normal.png"));
+        assert_eq!(name("basecolor.png", &int), Path::new("normal.png"));
+    }
+}
