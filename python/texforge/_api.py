@@ -364,13 +364,18 @@ def save_source_map(tile: Tile, path: PathType, *, overwrite: bool) -> None:
 
 def save_tile(tile: Tile, path: PathType, *, overwrite: bool) -> None:
     """See `Tile.save`."""
-    height, width = tile.params["size"]
+    kinds = {param["name"]: param["kind"] for param in _texforge.schema()}
+    params = {
+        name: json.loads(text) if kinds.get(name) in ("integer", "number") else text
+        for name, text in tile.report["params"]
+    }
+    # As the command line writes it, so that equal tiles make equal files.
     made = {
         "tool": "texforge",
         "version": tile.report["version"],
         "verb": "tile",
         "seed": tile.seed,
-        "params": {**tile.params, "size": f"{width}x{height}"},
+        "params": params,
     }
     _texforge.write(
         path=_arrays.path(path),

@@ -3,6 +3,8 @@
 //! It converts, enters the core through one doorway ([`enter`]) and maps errors. Names, defaults
 //! and documentation for people are in `python/texforge/_api.py`. No algorithm is in either.
 
+#![expect(clippy::needless_pass_by_value, reason = "pyo3 hands arguments over by value")]
+
 mod array;
 mod enter;
 mod error;
