@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
 import sysconfig
+import time
 from pathlib import Path
 
 import numpy as np
@@ -58,3 +60,23 @@ def test_what_cannot_be_done_exits_with_1(tmp_path: Path) -> None:
     assert result.returncode == 1, result
     assert "nowhere.png" in result.stderr
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc for the worker thread")
+def test_ctrl_c_exits_with_130_and_writes_nothing(tmp_path: Path) -> None:
+    texforge.write_image(tmp_path / "photo.png", noise(1100, 1100))
+    command = [str(SCRIPT), "tile", str(tmp_path / "photo.png"), "-o", str(tmp_path / "tile.png")]
+    options = ["--size", "1024x1024", "--quality", "best", "--threads", "1"]
+    with subprocess.Popen([*command, *options], stderr=subprocess.PIPE, text=True) as process:
+        names = Path(f"/proc/{process.pid}/task")
+        deadline = time.monotonic() + 30
+        while not any(
+            (task / "comm").read_text().startswith("texforge-") for task in names.iterdir()
+        ):
+            assert time.monotonic() < deadline
+            assert process.poll() is None
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=30)
+    assert process.returncode == 130, err
+    assert "Traceback" not in err
+    assert [p.name for p in tmp_path.iterdir()] == ["photo.png"]

@@ -108,7 +108,7 @@ def test_notebooks_show_the_tile_two_by_two(dtype: str, channels: int | None) ->
     if channels in (2, 4):
         photo[..., -1] = 255
     scale = {"uint8": 1, "uint16": 257}.get(dtype, 1 / 255)
-    png = texforge.tile((photo * scale).astype(dtype), **QUICK)._repr_png_()
+    png = texforge.tile((photo * np.float64(scale)).astype(dtype), **QUICK)._repr_png_()
     assert png is not None
     with Image.open(io.BytesIO(png)) as image:
         assert image.size == (64, 48)
