@@ -1,7 +1,7 @@
 //! Stationarity cost: how different the places of a texture are from each other.
 
 use crate::signal::histogram::Bins;
-use crate::signal::localhist::{Domain, LocalDistributions};
+use crate::signal::localhist::{Domain, LocalDistributions, Pixel};
 
 /// Mean earth mover's distance between the local histograms of two places of the picture, over
 /// all pairs of places, summed over the three channels (L*a*b* units); 0 for a picture that is the
@@ -12,12 +12,12 @@ use crate::signal::localhist::{Domain, LocalDistributions};
 ///
 /// # Determinism
 /// Same bytes for any thread count.
-pub fn histogram_cost(pixels: &[[f32; 3]], domain: Domain, sigma: f64) -> f64 {
+pub fn histogram_cost(pixels: &[Pixel], domain: Domain, sigma: f64) -> f64 {
     const BINS: usize = 128;
     (0..3)
         .map(|k| {
             let bins = Bins::covering(pixels.iter().map(|px| px[k]), BINS);
-            LocalDistributions::new(pixels, k, domain, sigma, bins).mean_distance()
+            LocalDistributions::new(pixels, None, k, domain, sigma, bins).mean_distance()
         })
         .sum()
 }
@@ -30,7 +30,7 @@ mod tests {
     fn a_stain_costs_and_noise_does_not() {
         let domain = Domain { height: 64, width: 64, wrap_y: true, wrap_x: true };
         let noise = |i: usize| ((i * 7919) % 97) as f32 / 4.0;
-        let even: Vec<[f32; 3]> = (0..4096).map(|i| [50.0 + noise(i), 0.0, 0.0]).collect();
+        let even: Vec<Pixel> = (0..4096).map(|i| [50.0 + noise(i), 0.0, 0.0, 0.0]).collect();
         let mut stained = even.clone();
         for (i, px) in stained.iter_mut().enumerate() {
             if (i / 64) < 24 && (i % 64) < 24 {

@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 use rayon::prelude::*;
 
-use crate::image::picture::{Encoding, Picture, Sample};
+use crate::image::picture::{Encoding, Picture, Sample, Samples};
 use crate::with_samples;
 
 /// Linear light from a display-referred sRGB value in `0..=1` (IEC 61966-2-1).
@@ -74,110 +74,153 @@ impl MatchSpace {
     }
 }
 
-/// Three channels a pixel in the space where averages are right: linear light for colours, the
-/// numbers themselves for data (by principal components if there are more than three).
-pub fn averaging_pixels(picture: &Picture) -> (Vec<[f32; 3]>, MatchSpace) {
-    let c = picture.channels();
-    let gray = picture.encoding != Encoding::Data && c <= 2;
-    let curve = |v: f64| match picture.encoding {
-        Encoding::Srgb => linear_from_srgb(v),
-        Encoding::Linear | Encoding::Data => v,
-    };
-    let space = match (picture.encoding, c) {
-        (Encoding::Srgb | Encoding::Linear, 1..=4) => MatchSpace::Lab,
-        _ => MatchSpace::Data,
-    };
-    if space == MatchSpace::Data && c > 3 {
-        return (crate::image::color::principal_components(picture), space);
-    }
-    let pick = |px: [f32; 4]| if gray { [px[0]; 3] } else { [px[0], px[1], px[2]] };
-    let n_used = if gray { 1 } else { c.min(3) };
-    let pixels = match picture.samples() {
-        // Integers by table.
-        crate::Samples::U8(v) => {
-            let table: Vec<f32> = (0..=255u8).map(|i| curve(i.to_unit()) as f32).collect();
-            v.par_chunks_exact(c)
-                .map(|px| {
-                    let mut out = [0.0; 4];
-                    (0..n_used).for_each(|k| out[k] = table[px[k] as usize]);
-                    pick(out)
-                })
-                .collect()
-        }
-        crate::Samples::U16(v) => {
-            let table: Vec<f32> = (0..=65535u16).map(|i| curve(i.to_unit()) as f32).collect();
-            v.par_chunks_exact(c)
-                .map(|px| {
-                    let mut out = [0.0; 4];
-                    (0..n_used).for_each(|k| out[k] = table[px[k] as usize]);
-                    pick(out)
-                })
-                .collect()
-        }
-        samples => with_samples!(samples, v => v
-            .par_chunks_exact(c)
-            .map(|px| {
-                let mut out = [0.0; 4];
-                for k in 0..n_used {
-                    // Only hidden pixels may be NaN here, and those are never used.
-                    let value = curve(px[k].to_unit()) as f32;
-                    out[k] = if value.is_finite() { value } else { 0.0 };
-                }
-                pick(out)
-            })
-            .collect()),
-    };
-    (pixels, space)
+/// How a picture's samples become three channels, fixed by one picture (the photo) and applied to
+/// others (its tiles), so that their colours can be compared.
+#[derive(Debug, Clone)]
+pub struct ColorModel {
+    space: MatchSpace,
+    encoding: Encoding,
+    components: Option<Components>,
 }
 
-/// The three strongest principal components of a picture with many channels, by power iteration
-/// on the covariance of at most 65536 evenly spaced pixels.
-fn principal_components(picture: &Picture) -> Vec<[f32; 3]> {
-    let c = picture.channels();
-    let n = picture.height() * picture.width();
-    let value = |i: usize, k: usize| picture.samples().unit(i * c + k);
-    let step = n.div_ceil(65_536);
-    let sample: Vec<usize> = (0..n).step_by(step).collect();
-    let mut mean = vec![0.0; c];
-    for &i in &sample {
-        (0..c).for_each(|k| mean[k] += value(i, k) / sample.len() as f64);
-    }
-    let mut covariance = vec![0.0; c * c];
-    for &i in &sample {
-        for a in 0..c {
-            for b in 0..c {
-                covariance[a * c + b] += (value(i, a) - mean[a]) * (value(i, b) - mean[b]);
-            }
+impl ColorModel {
+    /// The model for pictures like this one.
+    pub fn new(photo: &Picture) -> Self {
+        let encoding = photo.encoding;
+        let is_color = encoding != Encoding::Data && photo.channels() <= 4;
+        let many = !is_color && photo.channels() > 3;
+        Self {
+            space: if is_color { MatchSpace::Lab } else { MatchSpace::Data },
+            encoding,
+            components: many.then(|| Components::of(photo)),
         }
     }
-    let mut axes: Vec<Vec<f64>> = Vec::new();
-    for _ in 0..3 {
-        let mut axis: Vec<f64> = (0..c).map(|k| 1.0 + k as f64 / c as f64).collect();
-        for _ in 0..64 {
-            let mut next: Vec<f64> =
-                (0..c).map(|a| (0..c).map(|b| covariance[a * c + b] * axis[b]).sum()).collect();
-            for done in &axes {
-                let along: f64 = next.iter().zip(done).map(|(u, v)| u * v).sum();
-                next.iter_mut().zip(done).for_each(|(u, v)| *u -= along * v);
-            }
-            let norm = next.iter().map(|v| v * v).sum::<f64>().sqrt();
-            if norm <= f64::MIN_POSITIVE {
-                next = vec![0.0; c];
-            } else {
-                next.iter_mut().for_each(|v| *v /= norm);
-            }
-            axis = next;
-        }
-        axes.push(axis);
+
+    /// How averages become colours to match.
+    pub fn space(&self) -> MatchSpace {
+        self.space
     }
-    (0..n)
-        .into_par_iter()
-        .map(|i| {
-            std::array::from_fn(|a| {
-                (0..c).map(|k| (value(i, k) - mean[k]) * axes[a][k]).sum::<f64>() as f32
-            })
+
+    /// Three channels a pixel in the space where averages are right: linear light for colours, the
+    /// numbers themselves for data (their principal components if there are more than three).
+    pub fn averaging_pixels(&self, picture: &Picture) -> Vec<[f32; 3]> {
+        let c = picture.channels();
+        match picture.samples() {
+            Samples::U8(v) => self.by_table(v, c, &self.table(256)),
+            Samples::U16(v) => self.by_table(v, c, &self.table(65536)),
+            samples => with_samples!(samples, v => v
+                .par_chunks_exact(c)
+                .map(|px| self.averaging(c, |k| px[k].to_unit()))
+                .collect()),
+        }
+    }
+
+    /// The colour to match of pixel `i`.
+    pub fn matching_pixel(&self, picture: &Picture, i: usize) -> [f32; 3] {
+        let c = picture.channels();
+        let mut px = [self.averaging(c, |k| picture.samples().unit(i * c + k))];
+        self.space.convert_row(&mut px);
+        px[0]
+    }
+
+    fn linear(&self, v: f64) -> f64 {
+        if self.encoding == Encoding::Srgb { linear_from_srgb(v) } else { v }
+    }
+
+    /// Which sample each of the three channels shows, if there are no components.
+    fn channel(&self, c: usize, k: usize) -> Option<usize> {
+        match self.space {
+            MatchSpace::Lab => Some(if c <= 2 { 0 } else { k }),
+            MatchSpace::Data => (k < c).then_some(k),
+        }
+    }
+
+    fn averaging(&self, c: usize, unit: impl Fn(usize) -> f64) -> [f32; 3] {
+        if let Some(components) = &self.components {
+            return components.of_pixel(unit);
+        }
+        std::array::from_fn(|k| {
+            let value = self.channel(c, k).map_or(0.0, |k| self.linear(unit(k))) as f32;
+            // Only hidden pixels may be NaN here, and those are never used.
+            if value.is_finite() { value } else { 0.0 }
         })
-        .collect()
+    }
+
+    /// The linear value of every integer sample.
+    fn table(&self, n: usize) -> Vec<f32> {
+        (0..n).map(|i| self.linear(i as f64 / (n - 1) as f64) as f32).collect()
+    }
+
+    fn by_table<T: Sample + Into<usize>>(&self, v: &[T], c: usize, table: &[f32]) -> Vec<[f32; 3]> {
+        if self.components.is_some() {
+            return v
+                .par_chunks_exact(c)
+                .map(|px| self.averaging(c, |k| px[k].to_unit()))
+                .collect();
+        }
+        let channels: [Option<usize>; 3] = std::array::from_fn(|k| self.channel(c, k));
+        v.par_chunks_exact(c)
+            .map(|px| channels.map(|k| k.map_or(0.0, |k| table[px[k].into()])))
+            .collect()
+    }
+}
+
+/// The three strongest principal components of a picture with many channels.
+#[derive(Debug, Clone)]
+struct Components {
+    mean: Vec<f64>,
+    axes: Vec<Vec<f64>>,
+}
+
+impl Components {
+    /// By power iteration on the covariance of at most 65536 evenly spaced pixels.
+    fn of(picture: &Picture) -> Self {
+        let c = picture.channels();
+        let n = picture.height() * picture.width();
+        let value = |i: usize, k: usize| {
+            let value = picture.samples().unit(i * c + k);
+            if value.is_finite() { value } else { 0.0 }
+        };
+        let sample: Vec<usize> = (0..n).step_by(n.div_ceil(65_536)).collect();
+        let mut mean = vec![0.0; c];
+        for &i in &sample {
+            (0..c).for_each(|k| mean[k] += value(i, k) / sample.len() as f64);
+        }
+        let mut covariance = vec![0.0; c * c];
+        for &i in &sample {
+            for a in 0..c {
+                for b in 0..c {
+                    covariance[a * c + b] += (value(i, a) - mean[a]) * (value(i, b) - mean[b]);
+                }
+            }
+        }
+        let mut axes: Vec<Vec<f64>> = Vec::new();
+        for _ in 0..3 {
+            let mut axis: Vec<f64> = (0..c).map(|k| 1.0 + k as f64 / c as f64).collect();
+            for _ in 0..64 {
+                let mut next: Vec<f64> =
+                    (0..c).map(|a| (0..c).map(|b| covariance[a * c + b] * axis[b]).sum()).collect();
+                for done in &axes {
+                    let along: f64 = next.iter().zip(done).map(|(u, v)| u * v).sum();
+                    next.iter_mut().zip(done).for_each(|(u, v)| *u -= along * v);
+                }
+                let norm = next.iter().map(|v| v * v).sum::<f64>().sqrt();
+                let scale = if norm > f64::MIN_POSITIVE { 1.0 / norm } else { 0.0 };
+                next.iter_mut().for_each(|v| *v *= scale);
+                axis = next;
+            }
+            axes.push(axis);
+        }
+        Self { mean, axes }
+    }
+
+    fn of_pixel(&self, unit: impl Fn(usize) -> f64) -> [f32; 3] {
+        std::array::from_fn(|a| {
+            let along = self.axes[a].iter().zip(&self.mean).enumerate();
+            let value = along.map(|(k, (axis, mean))| (unit(k) - mean) * axis).sum::<f64>() as f32;
+            if value.is_finite() { value } else { 0.0 }
+        })
+    }
 }
 
 #[cfg(test)]
@@ -230,9 +273,8 @@ mod tests {
         let pattern = |i: usize| ((i * 37) % 101) as f32 / 101.0;
         let samples = (0..400).flat_map(|i| (1..=5).map(move |k| pattern(i) * k as f32)).collect();
         let picture =
-            Picture::new(20, 20, 5, crate::Samples::F32(samples), Encoding::Data).expect("valid");
-        let (px, space) = averaging_pixels(&picture);
-        assert_eq!(space, MatchSpace::Data);
+            Picture::new(20, 20, 5, Samples::F32(samples), Encoding::Data).expect("valid");
+        let px = ColorModel::new(&picture).averaging_pixels(&picture);
         let scale = (1..=5).map(|k| (k * k) as f32).sum::<f32>().sqrt();
         for i in 1..400 {
             let step = (px[i][0] - px[i - 1][0]).abs();

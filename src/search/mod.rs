@@ -3,5 +3,6 @@
 pub mod field;
 pub mod patch;
 pub mod patchmatch;
+pub mod seams;
 pub mod source;
 pub mod vote;

@@ -279,7 +279,7 @@ impl Band<'_> {
 
 /// Index `d` beside `i` among `n`, around the end if `wrap`.
 #[inline(always)]
-fn neighbor(i: usize, d: isize, n: usize, wrap: bool) -> Option<usize> {
+pub(crate) fn neighbor(i: usize, d: isize, n: usize, wrap: bool) -> Option<usize> {
     let j = i as isize + d;
     if (0..n as isize).contains(&j) {
         Some(j as usize)

@@ -57,6 +57,12 @@ impl Distribution {
         Self { bins, cdf }
     }
 
+    /// The distribution with these shares below the bins' edges.
+    pub fn from_cumulative(bins: Bins, cdf: Vec<f32>) -> Self {
+        assert_eq!(cdf.len(), bins.n + 1, "one share an edge");
+        Self { bins, cdf }
+    }
+
     /// The distribution of these values.
     pub fn of(values: impl Iterator<Item = f32>, bins: Bins) -> Self {
         let mut masses = vec![0u64; bins.n];
@@ -108,6 +114,19 @@ pub struct Quantiles {
 }
 
 impl Quantiles {
+    /// The median of each quantile over several distributions.
+    pub fn median(all: &[Self]) -> Self {
+        assert!(!all.is_empty(), "a median of nothing");
+        let table = (0..all[0].table.len())
+            .map(|i| {
+                let mut values: Vec<f32> = all.iter().map(|q| q.table[i]).collect();
+                let middle = values.len() / 2;
+                *values.select_nth_unstable_by(middle, f32::total_cmp).1
+            })
+            .collect();
+        Self { table }
+    }
+
     /// The value below which the share `u` in `0..=1` lies.
     #[inline]
     pub fn at(&self, u: f32) -> f32 {

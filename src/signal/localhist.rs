@@ -5,7 +5,10 @@
 
 use rayon::prelude::*;
 
-use crate::signal::histogram::{Bins, Distribution};
+use crate::signal::histogram::{Bins, Distribution, Quantiles};
+
+/// Channels that are evened out together, each by itself: L*, a*, b* and local contrast.
+pub type Pixel = [f32; 4];
 
 /// A picture's size and whether each axis wraps around.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -108,7 +111,14 @@ impl LocalDistributions {
     ///
     /// # Determinism
     /// Same bytes for any thread count.
-    pub fn new(pixels: &[[f32; 3]], k: usize, domain: Domain, sigma: f64, bins: Bins) -> Self {
+    pub fn new(
+        pixels: &[Pixel],
+        usable: Option<&[bool]>,
+        k: usize,
+        domain: Domain,
+        sigma: f64,
+        bins: Bins,
+    ) -> Self {
         let Domain { height, width, wrap_y, wrap_x } = domain;
         assert_eq!(pixels.len(), height * width, "pixels do not fill the domain");
         let rows = Axis::new(height, wrap_y, sigma);
@@ -124,7 +134,12 @@ impl LocalDistributions {
         mass.par_chunks_mut(cols.n * n).zip(&pixel_rows).for_each(|(mass, pixel_rows)| {
             for &(y, weight_y) in pixel_rows {
                 let row = &pixels[y * width..][..width];
-                for (px, &(low, high, at)) in row.iter().zip(&cols.place).step_by(step_x) {
+                let usable = usable.map(|u| &u[y * width..][..width]);
+                for (x, &(low, high, at)) in cols.place.iter().enumerate().step_by(step_x) {
+                    if usable.is_some_and(|u| !u[x]) {
+                        continue;
+                    }
+                    let px = row[x];
                     let bin = bins.place(px[k]).0;
                     mass[low * n + bin] += weight_y * (1.0 - at);
                     mass[high * n + bin] += weight_y * at;
@@ -157,7 +172,12 @@ impl LocalDistributions {
                     sum.iter_mut().zip(row).for_each(|(s, &m)| *s += weight * m);
                 }
                 for (out, cell) in out.chunks_exact_mut(n + 1).zip(sum.chunks_exact(n)) {
-                    let scale = 1.0 / cell.iter().sum::<f32>();
+                    // Where nothing is usable the distribution is undefined: all zeros.
+                    let total = cell.iter().sum::<f32>();
+                    if total < 1e-6 {
+                        continue;
+                    }
+                    let scale = 1.0 / total;
                     let mut below = 0.0;
                     for (out, &m) in out[1..].iter_mut().zip(cell) {
                         below += m;
@@ -188,6 +208,18 @@ impl LocalDistributions {
         let top = cell(y0, x0) + (cell(y0, x1) - cell(y0, x0)) * fx;
         let bottom = cell(y1, x0) + (cell(y1, x1) - cell(y1, x0)) * fx;
         top + (bottom - top) * fy
+    }
+
+    /// The typical local distribution: the median over all places of each quantile.
+    pub fn typical(&self) -> Quantiles {
+        let edges = self.bins.n + 1;
+        let places: Vec<Quantiles> = self
+            .cdf
+            .par_chunks_exact(edges)
+            .filter(|cdf| cdf[edges - 1] > 0.0)
+            .map(|cdf| Distribution::from_cumulative(self.bins, cdf.to_vec()).quantiles())
+            .collect();
+        Quantiles::median(&places)
     }
 
     /// Mean earth mover's distance between the distributions of two cells, over all pairs.
@@ -222,15 +254,15 @@ impl LocalDistributions {
 ///
 /// # Determinism
 /// Same bytes for any thread count.
-pub fn project(pixels: &mut [[f32; 3]], domain: Domain, sigma: f64) {
+pub fn project(pixels: &mut [Pixel], domain: Domain, sigma: f64) {
     /// Fewer would round the colours, more would starve the bins.
     const BINS: usize = 96;
-    for k in 0..3 {
+    for k in 0..4 {
         let bins = Bins::covering(pixels.iter().map(|px| px[k]), BINS);
         if pixels.iter().all(|px| px[k] == bins.low) {
             continue;
         }
-        let local = LocalDistributions::new(pixels, k, domain, sigma, bins);
+        let local = LocalDistributions::new(pixels, None, k, domain, sigma, bins);
         let quantiles = local.global().quantiles();
         pixels.par_chunks_mut(domain.width).enumerate().for_each(|(y, row)| {
             for (x, px) in row.iter_mut().enumerate() {
@@ -247,27 +279,20 @@ mod tests {
 
     const DOMAIN: Domain = Domain { height: 40, width: 56, wrap_y: true, wrap_x: true };
 
-    fn picture(domain: Domain) -> Vec<[f32; 3]> {
+    fn picture(domain: Domain) -> Vec<Pixel> {
         // A gradient, a blob and noise: far from stationary.
         (0..domain.height * domain.width)
             .map(|i| {
                 let (y, x) = ((i / domain.width) as f32, (i % domain.width) as f32);
                 let noise = Rng::new(5, 0, 0, i as u64).below(1000) as f32 / 50.0;
                 let blob = if (y - 12.0).hypot(x - 20.0) < 8.0 { -15.0 } else { 0.0 };
-                [40.0 + noise + blob, noise - 0.2 * x, 7.0]
+                [40.0 + noise + blob, noise - 0.2 * x, 7.0, 0.0]
             })
             .collect()
     }
 
     /// The definition: Gaussian weights over all pixels (on the torus, over all images of each).
-    fn share_below_direct(
-        px: &[[f32; 3]],
-        d: Domain,
-        sigma: f64,
-        y: usize,
-        x: usize,
-        v: f32,
-    ) -> f64 {
+    fn share_below_direct(px: &[Pixel], d: Domain, sigma: f64, y: usize, x: usize, v: f32) -> f64 {
         let axis = |i: usize, j: usize, n: usize, wrap: bool| -> f64 {
             let images = if wrap { -3..=3 } else { 0..=0 };
             images
@@ -297,7 +322,7 @@ mod tests {
             let domain = Domain { wrap_y: wrap, wrap_x: wrap, ..DOMAIN };
             let px = picture(domain);
             let bins = Bins::covering(px.iter().map(|p| p[0]), 96);
-            let local = LocalDistributions::new(&px, 0, domain, sigma, bins);
+            let local = LocalDistributions::new(&px, None, 0, domain, sigma, bins);
             let mut worst = 0f64;
             for y in (0..domain.height).step_by(3) {
                 for x in (0..domain.width).step_by(3) {
@@ -319,7 +344,7 @@ mod tests {
     fn the_mean_distance_agrees_with_all_pairs() {
         let px = picture(DOMAIN);
         let bins = Bins::covering(px.iter().map(|p| p[0]), 64);
-        let local = LocalDistributions::new(&px, 0, DOMAIN, 5.0, bins);
+        let local = LocalDistributions::new(&px, None, 0, DOMAIN, 5.0, bins);
         let cells: Vec<&[f32]> = local.cdf.chunks_exact(65).collect();
         let mut sum = 0.0;
         for a in &cells {
@@ -335,9 +360,9 @@ mod tests {
     fn projection_evens_out_and_keeps_the_global_histogram() {
         let mut px = picture(DOMAIN);
         let bins = Bins::covering(px.iter().map(|p| p[0]), 64);
-        let before = LocalDistributions::new(&px, 0, DOMAIN, 5.0, bins);
+        let before = LocalDistributions::new(&px, None, 0, DOMAIN, 5.0, bins);
         project(&mut px, DOMAIN, 5.0);
-        let after = LocalDistributions::new(&px, 0, DOMAIN, 5.0, bins);
+        let after = LocalDistributions::new(&px, None, 0, DOMAIN, 5.0, bins);
         assert!(
             after.mean_distance() < 0.5 * before.mean_distance(),
             "{} -> {}",
@@ -357,7 +382,7 @@ mod tests {
         let sigma = 8.0;
         let px = picture(DOMAIN);
         let (dy, dx) = (20, 28);
-        let mut rolled: Vec<[f32; 3]> = (0..px.len())
+        let mut rolled: Vec<Pixel> = (0..px.len())
             .map(|i| {
                 let (y, x) = (i / DOMAIN.width, i % DOMAIN.width);
                 px[(y + dy) % DOMAIN.height * DOMAIN.width + (x + dx) % DOMAIN.width]

@@ -1,15 +1,25 @@
 //! [`tile`]: a photo becomes a texture that repeats.
 
+use std::time::Instant;
+
 use serde::Serialize;
 
+use crate::analyze::{stationarity, texture};
 use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
+use crate::base::memory::ensure_available;
 use crate::base::params::{Value, choice, params};
+use crate::image::color::ColorModel;
 use crate::image::mask::Mask;
+use crate::image::material::MapKind;
 use crate::image::picture::Picture;
 use crate::image::sourcemap::SourceMap;
-use crate::method::stationary;
+use crate::method::{make_seamless, stationary};
 use crate::search::patchmatch::Wrap;
+use crate::signal::localhist::{Domain, Pixel};
+
+/// Longest side of a tile, in pixels.
+const MAX_TILE_SIDE: usize = 32_768;
 
 /// Size of the tile.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -124,8 +134,9 @@ params! {
 pub struct Costs {
     /// Texture cost: mean over pixels of the squared CIE L*a*b* distance per patch pixel between
     /// the tile's patch and the photo's patch named by the source map (paper eq. 5). An upper
-    /// bound of the exact cost, which takes the best patch of the whole photo.
-    pub texture: f64,
+    /// bound of the exact cost, which takes the best patch of the whole photo, averaged over an
+    /// even grid of patches. `None` for [`Method::MakeSeamless`], whose pixels are not the photo's.
+    pub texture: Option<f64>,
     /// Stationarity cost: mean earth mover's distance between the local histograms of two places,
     /// summed over L*, a* and b* (paper eq. 1 and 3), in L*a*b* units.
     pub stationarity: f64,
@@ -198,29 +209,134 @@ impl TileParams {
 /// [`Error::EmptyMask`], [`Error::SizeMismatch`] (mask), [`Error::NotFinite`], [`Error::Memory`]
 /// (checked before anything is allocated), [`Error::Cancelled`].
 pub fn tile(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, params: &TileParams) -> Result<Tile> {
-    params.validate()?;
-    let (width, height) = params.resolved_size(photo.width(), photo.height());
-    let plan = stationary::Plan {
-        size: (height, width),
-        wrap: Wrap { y: params.axis != Axis::X, x: params.axis != Axis::Y },
-        sigma: (params.method == Method::Stationary && params.measure != Measure::None)
-            .then_some(params.sigma),
-        patch: params.patch,
-        uniformity: params.uniformity,
-        coarse_iterations: 30,
-        fine_iterations: 2,
-    };
-    let output = ctx.install(|| stationary::run(ctx, photo, mask, &plan))?;
-    let picture = output.source_map.apply(photo, crate::MapKind::Data)?;
+    let start = Instant::now();
+    let (width, height) = check(photo, params)?;
+    let size = (height, width);
+    let wrap = Wrap { y: params.axis != Axis::X, x: params.axis != Axis::Y };
+    let mask = usable_mask(photo, mask)?;
+    let mut notes = Vec::new();
+    if mask.is_some() && params.method == Method::MakeSeamless {
+        notes.push("the method make-seamless uses the whole photo; the mask is ignored".to_owned());
+    }
+
+    let (picture, source_map) = ctx.install(|| {
+        if params.method == Method::MakeSeamless {
+            return Ok((make_seamless::run(photo, size, wrap)?, None));
+        }
+        let plan = plan(params, size, wrap);
+        let map = stationary::run(ctx, photo, mask.as_ref(), &plan)?;
+        Ok((map.apply(photo, MapKind::Color)?, Some(map)))
+    })?;
+    let made = start.elapsed();
+    let costs = ctx.install(|| Ok(costs(photo, &picture, source_map.as_ref(), params, wrap)))?;
+    let mut resolved = params.clone();
+    resolved.size = Size::Pixels { width, height };
     let report = Report {
         version: env!("CARGO_PKG_VERSION"),
         seed: ctx.seed,
-        params: params.show(),
+        params: resolved.show(),
         photo_size: (photo.width(), photo.height()),
         tile_size: (width, height),
-        costs: Costs { texture: 0.0, stationarity: 0.0 },
-        seconds: vec![],
-        notes: vec![],
+        costs,
+        seconds: vec![
+            ("synthesis", made.as_secs_f64()),
+            ("costs", (start.elapsed() - made).as_secs_f64()),
+        ],
+        notes,
     };
-    Ok(Tile { picture, source_map: Some(output.source_map), report })
+    Ok(Tile { picture, source_map, report })
+}
+
+/// Checks everything that can be known before the work; returns the tile's width and height.
+fn check(photo: &Picture, params: &TileParams) -> Result<(usize, usize)> {
+    params.validate()?;
+    if params.patch.is_multiple_of(2) {
+        return Err(Error::parameter("patch", "odd, so that a patch has a middle", params.patch));
+    }
+    let (width, height) = params.resolved_size(photo.width(), photo.height());
+    let sides = 1..=MAX_TILE_SIDE;
+    if !sides.contains(&width) || !sides.contains(&height) {
+        let expected = format!("1x1 to {MAX_TILE_SIDE}x{MAX_TILE_SIDE} pixels");
+        return Err(Error::parameter("size", expected, format!("{width}x{height}")));
+    }
+    let too_small = |what: &str, width: usize, height: usize, remedy: &str| Error::TooSmall {
+        what: what.into(),
+        width,
+        height,
+        need: params.patch,
+        remedy: remedy.into(),
+    };
+    let (pw, ph) = (photo.width(), photo.height());
+    if params.method == Method::MakeSeamless {
+        if width > pw || height > ph {
+            let expected = format!("at most the photo's {pw}x{ph} with the method make-seamless");
+            return Err(Error::parameter("size", expected, format!("{width}x{height}")));
+        }
+    } else if pw.min(ph) < params.patch {
+        return Err(too_small("the photo", pw, ph, "choose a smaller patch or a larger photo"));
+    } else if width.min(height) < params.patch {
+        return Err(too_small(
+            "the tile",
+            width,
+            height,
+            "choose a smaller patch or a larger size",
+        ));
+    }
+    photo.ensure_finite("the photo")?;
+    let need = stationary::memory_bytes((ph, pw), (height, width))
+        .checked_add((width * height) as u64 * (photo.byte_len() / (pw * ph)) as u64);
+    ensure_available(&format!("a {width}x{height} tile from a {pw}x{ph} photo"), need)?;
+    Ok((width, height))
+}
+
+/// Where the photo may be used: the caller's mask and the photo's own alpha; `None` is everywhere.
+fn usable_mask(photo: &Picture, mask: Option<&Mask>) -> Result<Option<Mask>> {
+    if let Some(mask) = mask {
+        mask.ensure_size(photo.height(), photo.width())?;
+    }
+    let both = match (mask, Mask::from_alpha(photo)) {
+        (Some(mask), Some(alpha)) => Some(mask.and(&alpha)?),
+        (Some(mask), None) => Some(mask.clone()),
+        (None, alpha) => alpha,
+    };
+    Ok(both.filter(|m| m.count() < m.usable().len()))
+}
+
+fn plan(params: &TileParams, size: (usize, usize), wrap: Wrap) -> stationary::Plan {
+    let even = params.method == Method::Stationary && params.measure != Measure::None;
+    let wraps = params.method != Method::NoWrap;
+    let (coarse_iterations, fine_iterations) = match params.quality {
+        Quality::Draft => (12, 1),
+        Quality::Normal => (30, 2),
+        Quality::Best => (60, 6),
+    };
+    stationary::Plan {
+        size,
+        wrap: Wrap { y: wrap.y && wraps, x: wrap.x && wraps },
+        sigma: even.then_some(params.sigma),
+        patch: params.patch,
+        uniformity: params.uniformity,
+        coarse_iterations,
+        fine_iterations,
+    }
+}
+
+fn costs(
+    photo: &Picture,
+    picture: &Picture,
+    map: Option<&SourceMap>,
+    params: &TileParams,
+    wrap: Wrap,
+) -> Costs {
+    let model = ColorModel::new(photo);
+    let mut pixels = model.averaging_pixels(picture);
+    model.space().convert_row(&mut pixels);
+    let pixels: Vec<Pixel> = pixels.into_iter().map(|[l, a, b]| [l, a, b, 0.0]).collect();
+    let (height, width) = (picture.height(), picture.width());
+    let domain = Domain { height, width, wrap_y: wrap.y, wrap_x: wrap.x };
+    let sigma = f64::from(params.sigma) * height.min(width) as f64;
+    Costs {
+        texture: map.map(|map| texture::cost_bound(picture, photo, map, params.patch, wrap)),
+        stationarity: stationarity::histogram_cost(&pixels, domain, sigma),
+    }
 }

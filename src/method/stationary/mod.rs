@@ -13,11 +13,23 @@ use crate::image::sourcemap::SourceMap;
 use crate::search::field::Field;
 use crate::search::patch::MatchImage;
 use crate::search::patchmatch::{self, Search, Usage, Wrap};
+use crate::search::seams;
 use crate::search::vote::{Votes, vote};
 use crate::signal::histogram::{Bins, Distribution};
-use crate::signal::localhist::{self, Domain};
+use crate::signal::localhist::{self, Domain, Pixel};
 
 use level::{Codes, Level};
+
+/// Channel that holds local contrast; the three before it are the colour.
+const CONTRAST: usize = 3;
+
+/// Share by which the contrast is pulled back to the exemplar's in every iteration. Averaging votes
+/// drift towards smooth places; without this pull fine detail dies out (sharpness of the gallery's
+/// concrete falls to half the photo's), and at 1 outliers come back.
+const CONTRAST_PULL: f32 = 0.5;
+
+/// Sweeps of the seam placement; after four hardly a pixel moves.
+const SEAM_SWEEPS: u32 = 4;
 
 /// What to make, and how hard to try.
 #[derive(Debug, Clone)]
@@ -39,18 +51,11 @@ pub struct Plan {
     pub fine_iterations: u32,
 }
 
-/// The result: where every pixel comes from.
-#[derive(Debug)]
-pub struct Output {
-    /// Output pixel to photo pixel.
-    pub source_map: SourceMap,
-}
-
-/// Synthesizes a texture from `photo`.
+/// Synthesizes a texture from `photo`: where every output pixel comes from.
 ///
 /// # Errors
 /// See [`tile`](crate::tile).
-pub fn run(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, plan: &Plan) -> Result<Output> {
+pub fn run(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, plan: &Plan) -> Result<SourceMap> {
     let levels = level::build(photo, mask, plan)?;
     let n_coarse = levels.len() - 1;
     let iterations = |j: usize| {
@@ -94,14 +99,36 @@ pub fn run(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, plan: &Plan) -> Resu
     }
     let field = field.expect("there is at least one level");
     let half = plan.patch / 2;
-    let yx = field.pos.iter().map(|p| [(p.y() + half) as u32, (p.x() + half) as u32]).collect();
-    let source_map = SourceMap::new(plan.size, (photo.height(), photo.width()), yx)?;
-    Ok(Output { source_map })
+    let finest = &levels[0];
+    let mut yx: Vec<seams::From> =
+        field.pos.iter().map(|p| [(p.y() + half) as u32, (p.x() + half) as u32]).collect();
+    let pixels = Pixels::voted(ctx, &field, finest, plan.wrap);
+    let target = pixels.delivered(finest, plan);
+    let canvas = seams::Canvas {
+        source: &finest.source.image,
+        usable: mask.map(Mask::usable),
+        target: &target,
+        wrap: plan.wrap,
+    };
+    seams::settle(ctx, &canvas, &mut yx, SEAM_SWEEPS)?;
+    SourceMap::new(plan.size, (photo.height(), photo.width()), yx)
+}
+
+/// Peak memory of [`run`] besides the photo itself, for a photo and an output of these sizes
+/// (height, width), in bytes; generous by a quarter.
+pub fn memory_bytes(photo: (usize, usize), output: (usize, usize)) -> u64 {
+    // Per photo pixel: linear light and L*a*b* in floats (12 + 16 + 16), contrast 4, and the
+    // pyramid's codes and norms, 8 bytes times 1 / (1 - 1.3^-2).
+    const PHOTO: u64 = 76;
+    // Per output pixel: two fields 8, votes 8, L*a*b* 16, canvas 4, source map and sweeps 32.
+    const OUTPUT: u64 = 80;
+    let pixels = |(h, w): (usize, usize)| h as u64 * w as u64;
+    (PHOTO * pixels(photo) + OUTPUT * pixels(output)) / 4 * 5
 }
 
 /// The current texture in L*a*b*, with an apron on the axes that do not wrap.
 struct Pixels {
-    lab: Vec<[f32; 3]>,
+    lab: Vec<Pixel>,
     domain: Domain,
 }
 
@@ -126,10 +153,8 @@ impl Pixels {
     /// (1 - alpha) Q_f`.
     fn match_global(&mut self, level: &Level, alpha: f32) {
         use rayon::prelude::*;
-        if alpha <= 0.0 {
-            return;
-        }
-        for k in 0..3 {
+        for k in 0..4 {
+            let alpha = if k == CONTRAST { alpha.max(CONTRAST_PULL) } else { alpha };
             let bins = Bins::covering(self.lab.iter().map(|px| px[k]), 256);
             let own = Distribution::of(self.lab.iter().map(|px| px[k]), bins);
             let quantiles = &level.quantiles[k];
@@ -138,6 +163,19 @@ impl Pixels {
                 px[k] += alpha * (wanted - px[k]);
             });
         }
+    }
+
+    /// The texture as codes, without apron.
+    fn delivered(&self, level: &Level, plan: &Plan) -> MatchImage {
+        let ((h, w), half) = (level.size, plan.patch / 2);
+        let y0 = if plan.wrap.y { 0 } else { half };
+        let x0 = if plan.wrap.x { 0 } else { half };
+        let mut image = MatchImage::new(h, w);
+        image.fill_rows(|y, row| {
+            let from = &self.lab[(y + y0) * self.domain.width + x0..];
+            row.iter_mut().zip(from).for_each(|(px, &lab)| *px = level.codes.encode(lab));
+        });
+        image
     }
 
     /// The texture as codes on the canvas, apron included.
