@@ -28,10 +28,7 @@ def row(path: Path, out: Path, arguments: argparse.Namespace) -> list[contact.Ce
         started = time.perf_counter()
         tile = texforge.tile(photo, size=side, method=method, seed=arguments.seed)
         seconds = time.perf_counter() - started
-        label = (
-            f"{method}: texture {tile.costs.texture:.3g}, "
-            f"stationarity {tile.costs.stationarity:.3g}, {seconds:.1f} s"
-        )
+        label = f"{method}: {tile.costs}, {seconds:.1f} s"
         print(f"{path}: {label}", flush=True)
         picture = contact.shown(tile.tiled(3, 3), tile.encoding)
         contact.shown(tile.image, tile.encoding).save(out / f"{path.stem}_{method}.png")

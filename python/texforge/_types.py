@@ -100,16 +100,22 @@ class Costs:
 
     Attributes
     ----------
-    texture : float
+    texture : float or None
         Mean squared CIE L*a*b* distance, per pixel of a patch, between the tile's patches and
         the photo's patches that they were copied from. High where copies do not fit together.
+        None for the method ``"make-seamless"``, which blends.
     stationarity : float
         Mean earth mover's distance between the local histograms of two places of the tile, in
         CIE L*a*b* units. High where one part of the tile looks different from another.
     """
 
-    texture: float
+    texture: float | None
     stationarity: float
+
+    def __str__(self) -> str:
+        """Say both in words."""
+        texture = "" if self.texture is None else f"texture cost {self.texture:.3g}, "
+        return f"{texture}stationarity cost {self.stationarity:.3g}"
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -245,11 +251,7 @@ class Tile:
     def __repr__(self) -> str:
         """Say what it is in one line."""
         height, width = self.image.shape[:2]
-        return (
-            f"Tile({height} x {width} {self.image.dtype}, "
-            f"texture cost {self.costs.texture:.3g}, "
-            f"stationarity cost {self.costs.stationarity:.3g}, seed {self.seed})"
-        )
+        return f"Tile({height} x {width} {self.image.dtype}, {self.costs}, seed {self.seed})"
 
     def _repr_png_(self) -> bytes | None:
         """Return the tile repeated two by two, for notebooks."""

@@ -2,5 +2,6 @@
 
 mod cli;
 mod house;
+mod io;
 #[path = "../support/mod.rs"]
 mod support;

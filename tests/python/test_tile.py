@@ -65,8 +65,10 @@ def test_every_method_and_axis(photo: Photo, method: Any, axis: Any) -> None:
 
 def test_costs_are_finite_and_not_negative(photo: Photo) -> None:
     costs = texforge.tile(photo, **QUICK).costs
+    assert costs.texture is not None
     assert 0 <= costs.texture < 1e6
     assert 0 <= costs.stationarity < 1e6
+    assert texforge.tile(photo, method="make-seamless", **QUICK).costs.texture is None
 
 
 @given(seed=st.integers(0, 1000), share=st.floats(0.2, 0.9))

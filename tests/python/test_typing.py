@@ -23,7 +23,7 @@ def test_a_tile_from_everything(tmp_path: Path) -> None:
     assert_type(tile, texforge.Tile)
     assert_type(tile.image, npt.NDArray[Any])
     assert_type(tile.source_map, npt.NDArray[np.int32] | None)
-    assert_type(tile.costs.texture, float)
+    assert_type(tile.costs.texture, float | None)
     assert_type(tile.apply(photo, kind="color"), npt.NDArray[Any])
     assert_type(tile.maps, dict[str, npt.NDArray[Any]])
     texforge.tile(Image.fromarray(photo), size=24, patch=5, mask=photo[..., 0] >= 0)

@@ -76,8 +76,9 @@ pub(super) fn read_planes(source: &Source) -> Result<Planes> {
         AttributeValue::Text(text) => Some(text.to_string()),
         _ => None,
     };
-    let record = image.attributes.other.get(&Text::from("texforge")).and_then(text);
     let layer = image.layer_data;
+    // The crate files attributes it does not know under the layer.
+    let record = layer.attributes.other.get(&Text::from("texforge")).and_then(text);
     let (width, height) = (layer.size.0, layer.size.1);
     let channels: Vec<_> = layer
         .channel_data
@@ -131,8 +132,12 @@ pub(super) fn decode(source: &Source) -> Result<Raw> {
     let mut raw = Raw::new((planes.width, planes.height), chosen.len(), samples);
     if !is_color {
         raw.encoding = Encoding::Data;
-        let names: Vec<_> = planes.channels.iter().map(|(name, _)| name.as_str()).collect();
-        planes.notes.push(format!("the channels {} are used as data", names.join(", ")));
+        if source.kind == MapKind::Color {
+            let names: Vec<_> = planes.channels.iter().map(|(name, _)| name.as_str()).collect();
+            let note =
+                format!("the channels {} are no colors; they are used as data", names.join(", "));
+            planes.notes.push(note);
+        }
     }
     if is_color && alpha.is_some() && source.kind == MapKind::Color && divide(&mut raw) {
         planes

@@ -73,12 +73,7 @@ pub(super) fn decode(source: &Source) -> Result<Raw> {
     let mut raw = Raw::new(size, channels, Samples::U8(pixels));
     raw.icc = profile;
     raw.notes = notes;
-    let density = (f64::from(info.x_density), f64::from(info.y_density));
-    raw.pixels_per_metre = match info.pixel_density {
-        1 => exif::per_metre(Some(density), 2),
-        2 => exif::per_metre(Some(density), 3),
-        _ => None,
-    };
+    raw.pixels_per_metre = jfif_resolution(source.bytes);
     if let Some(block) = decoder.exif() {
         let (orientation, resolution) = exif::parse(block);
         raw.orientation = orientation;
@@ -102,6 +97,17 @@ fn has_end(bytes: &[u8]) -> bool {
         }
     }
     bytes.get(at.min(bytes.len())..).is_some_and(|rest| rest.windows(2).any(|w| w == [0xFF, 0xD9]))
+}
+
+/// The resolution in the JFIF header, which comes first if there is one.
+fn jfif_resolution(bytes: &[u8]) -> Option<(u32, u32)> {
+    let header = bytes.get(2..18)?;
+    if !(header.starts_with(&[0xFF, 0xE0]) && header[4..].starts_with(b"JFIF\0")) {
+        return None;
+    }
+    let number = |at: usize| f64::from(u16::from_be_bytes([header[at], header[at + 1]]));
+    // Units: 0 none, 1 per inch, 2 per centimetre; one more in EXIF.
+    exif::per_metre(Some((number(12), number(14))), u16::from(header[11]) + 1)
 }
 
 /// Print files store the inks inverted (0 is full ink), a convention of Adobe's that everybody

@@ -312,4 +312,6 @@ fn unnamed() -> PathBuf {
 }
 
 #[cfg(test)]
+mod color_tests;
+#[cfg(test)]
 mod tests;

