@@ -5,7 +5,6 @@ from __future__ import annotations
 import operator
 import os
 import sys
-import typing
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -17,6 +16,8 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
 _DTYPES = ("uint8", "uint16", "float16", "float32", "float64")
+
+_ENCODINGS: dict[str, Encoding] = {"srgb": "srgb", "linear": "linear", "data": "data"}
 
 # What Pillow's other modes become before they are arrays.
 _PILLOW_MODES = {
@@ -66,13 +67,12 @@ def unpacked(parts: tuple[bytearray, str, tuple[int, int, int], str]) -> npt.NDA
     return np.frombuffer(data, dtype=dtype).reshape(shape)
 
 
-def array_encoding(name: str) -> Encoding:
+def array_encoding(name: object) -> Encoding:
     """Return the name of an encoding, checked."""
-    for known in typing.get_args(Encoding):
-        if name == known:
-            return typing.cast("Encoding", known)
+    if isinstance(name, str) and name in _ENCODINGS:
+        return _ENCODINGS[name]
     raise ParameterError(
-        f"`encoding` must be one of auto, {', '.join(typing.get_args(Encoding))}, got {name!r}",
+        f"`encoding` must be one of auto, {', '.join(_ENCODINGS)}, got {name!r}",
         fields={"name": "encoding"},
     )
 

@@ -30,17 +30,20 @@ __all__ = [
     "Tile",
 ]
 
-Axis: TypeAlias = Literal["both", "x", "y"]
+# Unions, not Literal["a", "b"]: mypy holds both for the same, stubtest only the union.
+Axis: TypeAlias = Literal["both"] | Literal["x"] | Literal["y"]
 """In which directions a tile repeats."""
-Method: TypeAlias = Literal["stationary", "wrap-only", "no-wrap", "make-seamless"]
+Method: TypeAlias = (
+    Literal["stationary"] | Literal["wrap-only"] | Literal["no-wrap"] | Literal["make-seamless"]
+)
 """How a tile is made."""
-Measure: TypeAlias = Literal["histogram", "none"]
+Measure: TypeAlias = Literal["histogram"] | Literal["none"]
 """The statistic that is made equal everywhere in a tile."""
-Quality: TypeAlias = Literal["draft", "normal", "best"]
+Quality: TypeAlias = Literal["draft"] | Literal["normal"] | Literal["best"]
 """How much time to spend."""
-Encoding: TypeAlias = Literal["srgb", "linear", "data"]
+Encoding: TypeAlias = Literal["srgb"] | Literal["linear"] | Literal["data"]
 """What the numbers of a picture mean."""
-MapKind: TypeAlias = Literal["color", "data", "normal"]
+MapKind: TypeAlias = Literal["color"] | Literal["data"] | Literal["normal"]
 """What the numbers of a material's map mean."""
 PathType: TypeAlias = str | PathLike[str]
 """Where a file is."""
