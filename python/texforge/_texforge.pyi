@@ -8,6 +8,22 @@ _PictureOut = tuple[bytearray, str, tuple[int, int, int], str]
 _Map = tuple[Any, tuple[int, int], tuple[int, int]]
 _MapOut = tuple[bytearray, tuple[int, int], tuple[int, int]]
 
+__all__ = [
+    "__version__",
+    "apply",
+    "cli_main",
+    "encode_png",
+    "error_kinds",
+    "fail",
+    "map_kind",
+    "read",
+    "read_source_map",
+    "schema",
+    "tile",
+    "write",
+    "write_source_map",
+]
+
 __version__: str
 
 def tile(
