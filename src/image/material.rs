@@ -206,7 +206,7 @@ fn renormalize_pixel<T: Sample>(pixel: &mut [T]) {
         return;
     }
     for k in 0..3 {
-        pixel[k] = T::from_unit((n[k] / length + 1.0) / 2.0);
+        pixel[k] = T::from_unit(f64::midpoint(n[k] / length, 1.0));
     }
 }
 
@@ -364,7 +364,7 @@ mod tests {
         #[test]
         fn stored_unit_vectors_keep_their_bits(a in 0.0..std::f64::consts::TAU, z in -1.0..=1.0_f64) {
             let r = (1.0 - z * z).sqrt();
-            let n = [r * a.cos(), r * a.sin(), z].map(|v| (v + 1.0) / 2.0);
+            let n = [r * a.cos(), r * a.sin(), z].map(|v| f64::midpoint(v, 1.0));
             let bits = n.map(u8::from_unit).to_vec();
             let picture = Picture::new(1, 1, 3, Samples::U8(bits.clone()), Encoding::Data).expect("u8");
             prop_assert_eq!(renormalize(picture).expect("u8").into_samples(), Samples::U8(bits));

@@ -214,3 +214,25 @@ fn code_points_outrank_everything() {
     assert_eq!(pq.samples(), picture.samples());
     assert!(pq.meta.notes[0].contains("cICP"), "{:?}", pq.meta.notes);
 }
+
+#[test]
+fn exr_channels_are_colors_or_data_by_their_names() {
+    let plane = |v: f32| ::exr::image::FlatSamples::F32(vec![v, v + 10.0]);
+    let read = |names: &[(&str, f32)]| {
+        let channels = names.iter().map(|(name, v)| ((*name).to_owned(), plane(*v))).collect();
+        let bytes = exr::encode_planes((2, 1), channels, None, None).expect("encode");
+        read_bytes(&bytes, "a.exr", MapKind::Color).expect("read")
+    };
+    let color = read(&[("R", 1.0), ("G", 2.0), ("B", 3.0), ("Z", 9.0)]);
+    assert_eq!(color.samples(), &Samples::F32(vec![1.0, 2.0, 3.0, 11.0, 12.0, 13.0]));
+    assert_eq!(color.encoding, Encoding::Linear);
+    assert!(color.meta.notes[0].contains('Z'), "{:?}", color.meta.notes);
+    let layer = read(&[("base.R", 1.0), ("base.G", 2.0), ("base.B", 3.0)]);
+    assert_eq!((layer.channels(), layer.encoding), (3, Encoding::Linear));
+    assert_eq!(layer.samples(), &Samples::F32(vec![1.0, 2.0, 3.0, 11.0, 12.0, 13.0]));
+    let gray = read(&[("Y", 1.0)]);
+    assert_eq!((gray.channels(), gray.encoding), (1, Encoding::Linear));
+    let vector = read(&[("Z", 3.0), ("X", 1.0), ("Y", 2.0)]);
+    assert_eq!(vector.samples(), &Samples::F32(vec![1.0, 2.0, 3.0, 11.0, 12.0, 13.0]));
+    assert_eq!(vector.encoding, Encoding::Data);
+}

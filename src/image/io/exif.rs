@@ -56,8 +56,7 @@ impl Reader<'_> {
 }
 
 /// Pixels per metre from pixels per `unit` as EXIF and TIFF number it: 2 inch, 3 centimetre.
-/// Resolutions that nobody means (none, below one pixel per inch, 72 by default of cameras is
-/// kept) come out as `None`.
+/// Resolutions that nobody means (no unit, below one pixel per inch) come out as `None`.
 pub(super) fn per_metre(resolution: Option<(f64, f64)>, unit: u16) -> Option<(u32, u32)> {
     let scale = match unit {
         2 => 1.0 / 0.0254,

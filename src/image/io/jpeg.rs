@@ -63,7 +63,7 @@ pub(super) fn decode(source: &Source) -> Result<Raw> {
         ColorSpace::Luma => (1, decoded),
         ColorSpace::CMYK | ColorSpace::YCCK => {
             let inks = if space == ColorSpace::YCCK { inks_from_ycck(decoded) } else { decoded };
-            (3, rgb_from_inks(source, inks, &mut profile, &mut notes))
+            (3, rgb_from_inks(source, &inks, &mut profile, &mut notes))
         }
         _ => (3, decoded),
     };
@@ -126,15 +126,15 @@ fn inks_from_ycck(mut pixels: Vec<u8>) -> Vec<u8> {
 /// color is what the ink and the black leave of white.
 fn rgb_from_inks(
     source: &Source,
-    mut inks: Vec<u8>,
+    inks: &[u8],
     profile: &mut Option<Vec<u8>>,
     notes: &mut Vec<String>,
 ) -> Vec<u8> {
     if let Some(profile) = profile.take()
         && source.kind == MapKind::Color
     {
-        inks.iter_mut().for_each(|v| *v = 255 - *v);
-        match icc::srgb_from_cmyk(&inks, &profile) {
+        let amounts: Vec<u8> = inks.iter().map(|v| 255 - v).collect();
+        match icc::srgb_from_cmyk(&amounts, &profile) {
             Ok(rgb) => {
                 notes.push(
                     "the colors were converted from the embedded CMYK profile to sRGB".into(),
@@ -142,10 +142,9 @@ fn rgb_from_inks(
                 return rgb;
             }
             Err(reason) => {
-                notes.push(format!("the embedded CMYK profile is not usable ({reason})"))
+                notes.push(format!("the embedded CMYK profile is not usable ({reason})"));
             }
         }
-        inks.iter_mut().for_each(|v| *v = 255 - *v);
     }
     notes.push("the colors were converted from CMYK to RGB without a profile".into());
     let left = |ink: u8, black: u8| (u32::from(ink) * u32::from(black) + 127) / 255;
@@ -195,4 +194,27 @@ pub(super) fn encode(picture: &Picture, record: Option<&str>) -> Result<Vec<u8>,
         out.splice(at..at, comment);
     }
     Ok(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn inks_come_out_of_luma_and_chroma_inverted() {
+        // No ink at all is luma 0 in these files, and black is kept.
+        assert_eq!(inks_from_ycck(vec![0, 128, 128, 255]), [255, 255, 255, 255]);
+        assert_eq!(inks_from_ycck(vec![100, 128, 128, 7]), [155, 155, 155, 7]);
+        // Full cyan alone: the rotated color is pure red.
+        assert_eq!(inks_from_ycck(vec![76, 85, 255, 255]), [1, 255, 255, 255]);
+    }
+
+    #[test]
+    fn the_end_is_looked_for_behind_the_headers_only() {
+        let thumbnail = [0xFF, 0xD8, 0xFF, 0xE1, 0, 6, 0xFF, 0xD9, 0, 0];
+        let scan = [0xFF, 0xDA, 0, 4, 0, 0, 1, 2, 0xFF, 0];
+        let cut = [&thumbnail[..], &scan].concat();
+        assert!(!has_end(&cut), "the thumbnail's end is not the picture's");
+        assert!(has_end(&[&cut[..], &[0xFF, 0xD9]].concat()), "but this is");
+    }
 }

@@ -17,9 +17,12 @@ const VERSION: u32 = 1;
 /// What stands in the attribute `texforge`.
 #[derive(Serialize, Deserialize)]
 struct Header {
-    source_map: u32,
-    source_width: usize,
-    source_height: usize,
+    #[serde(rename = "source_map")]
+    version: u32,
+    #[serde(rename = "source_width")]
+    width: usize,
+    #[serde(rename = "source_height")]
+    height: usize,
 }
 
 /// Writes a source map as EXR: two 32-bit integer channels `source.x` and `source.y`, and an
@@ -35,8 +38,8 @@ pub fn write_source_map(path: &Path, map: &SourceMap, force: bool) -> Result<()>
         });
     }
     let internal = |message: String| Error::Internal { message };
-    let (source_height, source_width) = map.source_size();
-    let header = Header { source_map: VERSION, source_width, source_height };
+    let (height, width) = map.source_size();
+    let header = Header { version: VERSION, width, height };
     let header = serde_json::to_string(&header).map_err(|e| internal(e.to_string()))?;
     let plane = |k: usize| FlatSamples::U32(map.positions().iter().map(|p| p[k]).collect());
     let channels = vec![("source.x".to_owned(), plane(1)), ("source.y".to_owned(), plane(0))];
@@ -68,10 +71,10 @@ fn decode(source: &Source) -> Result<SourceMap> {
     let record = planes.record.ok_or_else(|| no_source_map(source, "its header is missing"))?;
     let header: Header = serde_json::from_str(&record)
         .map_err(|_| no_source_map(source, "its header does not say so"))?;
-    if header.source_map != VERSION {
+    if header.version != VERSION {
         return Err(source.bad(format!(
             "the source map has version {}, this program reads version {VERSION}; make it again",
-            header.source_map
+            header.version
         )));
     }
     let [(x_name, FlatSamples::U32(x)), (y_name, FlatSamples::U32(y))] = &planes.channels[..]
@@ -82,7 +85,7 @@ fn decode(source: &Source) -> Result<SourceMap> {
         return Err(no_source_map(source, "its channels are not source.x and source.y"));
     }
     let positions = y.iter().zip(x).map(|(y, x)| [*y, *x]).collect();
-    let source_size = (header.source_height, header.source_width);
+    let source_size = (header.height, header.width);
     SourceMap::new((planes.height, planes.width), source_size, positions)
         .map_err(|e| source.bad(e.to_string()))
 }

@@ -116,7 +116,9 @@ fn plain_line(record: &str) -> String {
             c if c.is_control() => line.push(' '),
             c => {
                 for unit in c.encode_utf16(&mut [0; 2]) {
-                    line.push_str(&format!("\\u{unit:04x}"));
+                    line.push_str("\\u");
+                    let digit = |k: u16| char::from_digit(u32::from(*unit >> k & 15), 16);
+                    line.extend([12, 8, 4, 0].into_iter().filter_map(digit));
                 }
             }
         }

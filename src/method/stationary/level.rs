@@ -123,7 +123,7 @@ pub(super) fn build(photo: &Picture, mask: Option<&Mask>, plan: &Plan) -> Result
             (eh, ew),
             usable.as_deref(),
             size,
-            plan.patch,
+            (plan.patch, plan.sigma.is_some()),
             &mut codes,
         ) {
             Some(level) => levels.push(level),
@@ -141,7 +141,7 @@ fn level(
     (eh, ew): (usize, usize),
     usable: Option<&[bool]>,
     size: (usize, usize),
-    patch: usize,
+    (patch, typical): (usize, bool),
     codes: &mut Option<Codes>,
 ) -> Option<Level> {
     use rayon::prelude::*;
@@ -163,7 +163,7 @@ fn level(
         .collect();
     let quantiles = std::array::from_fn(|k| {
         let bins = Bins::covering(sample.iter().map(|px| px[k]), 256);
-        if k < CONTRAST {
+        if typical && k < CONTRAST {
             let domain = Domain { height: eh, width: ew, wrap_y: false, wrap_x: false };
             let sigma = TYPICAL_WINDOW * eh.min(ew) as f64;
             LocalDistributions::new(&lab, usable, k, domain, sigma, bins).typical()

@@ -78,10 +78,9 @@ pub fn run(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, plan: &Plan) -> Resu
         let coarsest = j == n_coarse;
         for i in 0..iterations(j) {
             let mut pixels = Pixels::voted(ctx, &f, level, plan.wrap);
+            let fade = 1.0 - (i + 1) as f32 / iterations(j) as f32;
+            pixels.match_global(level, if coarsest { fade } else { 0.0 });
             if let Some(sigma) = plan.sigma {
-                let fade = 1.0 - (i + 1) as f32 / iterations(j) as f32;
-                let alpha = if coarsest { fade } else { 0.0 };
-                pixels.match_global(level, alpha);
                 let sigma = sigma as f64 * h.min(w) as f64;
                 localhist::project(&mut pixels.lab, pixels.domain, sigma);
             }
