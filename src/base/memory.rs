@@ -26,3 +26,16 @@ pub fn available_bytes() -> u64 {
     let machine = system.available_memory();
     system.cgroup_limits().map_or(machine, |group| machine.min(group.free_memory))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_cannot_be_had_is_refused() {
+        assert!(ensure_available("a byte", Some(1)).is_ok());
+        for need in [None, Some(u64::MAX)] {
+            assert!(matches!(ensure_available("all", need), Err(Error::Memory { .. })));
+        }
+    }
+}

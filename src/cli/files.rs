@@ -9,7 +9,9 @@ use crate::image::picture::{Picture, Sample, Samples};
 use crate::image::sourcemap::SourceMap;
 use crate::with_samples;
 
-pub(super) use crate::image::io::{check_output as check_place, read, read_source_map};
+pub(super) use crate::image::io::{
+    check_output as check_place, read, read_record, read_source_map,
+};
 pub(super) use crate::image::material::siblings;
 
 /// The bytes of a file at `path`, or of a PNG for standard output.

@@ -131,6 +131,18 @@ mod tests {
     }
 
     #[test]
+    fn a_map_of_another_shape_is_named() {
+        let of = |h, w| {
+            Picture::new(h, w, 1, Samples::U8(vec![0; h * w]), Encoding::Data).expect("picture")
+        };
+        let wanted = &specs(&["height=h.png"]).expect("map")[0];
+        assert!(ensure_fits(&of(12, 16), &of(6, 8), wanted).is_ok(), "twice as large");
+        let error = ensure_fits(&of(16, 12), &of(6, 8), wanted).expect_err("upright");
+        assert!(matches!(error, Error::SizeMismatch { got_w: 12, want_w: 8, .. }), "{error}");
+        assert!(error.to_string().contains("`height` (h.png)"), "{error}");
+    }
+
+    #[test]
     fn outputs_are_named_after_the_tile() {
         let of = |samples| Picture::new(1, 1, 1, samples, Encoding::Data).expect("picture");
         let (int, float) = (of(Samples::U16(vec![7])), of(Samples::F32(vec![0.5])));

@@ -66,8 +66,12 @@ pub(super) fn info(matches: &ArgMatches) -> Result<()> {
     let session = Session::new(std::sync::Arc::default(), false);
     watch_signals();
     let from = path.clone();
-    let picture = supervise(&session, move |_| files::read(&from, MapKind::Color))?;
+    let (picture, record) = supervise(&session, move |_| {
+        Ok((files::read(&from, MapKind::Color)?, files::read_record(&from)?))
+    })?;
     if matches.get_flag("json") {
+        let record: Option<serde_json::Value> =
+            record.map(|text| serde_json::from_str(&text).unwrap_or_else(|_| text.into()));
         return print_json(&json!({
             "schema_version": SCHEMA_VERSION,
             "path": path.to_string_lossy(),
@@ -79,6 +83,7 @@ pub(super) fn info(matches: &ArgMatches) -> Result<()> {
             "icc_bytes": picture.meta.icc.as_ref().map(Vec::len),
             "pixels_per_metre": picture.meta.pixels_per_metre,
             "notes": picture.meta.notes,
+            "record": record,
         }));
     }
     let mut rows = vec![
@@ -95,6 +100,7 @@ pub(super) fn info(matches: &ArgMatches) -> Result<()> {
         rows.push(("pixels per metre", format!("{x} x {y}")));
     }
     rows.extend(picture.meta.notes.iter().map(|note| ("note", note.clone())));
+    rows.extend(record.map(|record| ("made by", record)));
     let rows: Vec<_> = rows.into_iter().map(|(name, value)| vec![name.into(), value]).collect();
     to_stdout(table(&rows).as_bytes())
 }
@@ -122,7 +128,8 @@ pub(super) fn man(matches: &ArgMatches) -> Result<()> {
     if let Some(verb) = matches.get_one::<String>("verb") {
         command.build();
         if let Some(sub) = command.find_subcommand(verb) {
-            command = sub.clone().display_name(format!("texforge-{verb}"));
+            let version = env!("CARGO_PKG_VERSION");
+            command = sub.clone().display_name(format!("texforge-{verb}")).version(version);
         }
     }
     let mut text = Vec::new();

@@ -387,7 +387,7 @@ fn line(request: &Request, report: &Report, elapsed: Duration) -> String {
         Target::File(path) => path.display().to_string(),
     };
     let Costs { texture, stationarity } = report.costs;
-    let texture = texture.map_or_else(String::new, |cost| format!("texture cost {cost:.2}, "));
+    let texture = texture.map_or(String::new(), |cost| format!("texture cost {cost:.2}, "));
     format!(
         "{place}  {w}x{h}{why}, seed {}, {}, {texture}stationarity cost {stationarity:.2}",
         report.seed,

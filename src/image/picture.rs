@@ -290,3 +290,27 @@ impl Picture {
         Ok(picture)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn senseless_shapes_are_refused() {
+        for (h, w, c, n) in [(0, 4, 1, 0), (4, 4, 0, 0), (2, 2, 1, 3), (1 << 17, 1, 1, 1 << 17)] {
+            let result = Picture::new(h, w, c, Samples::U8(vec![0; n]), Encoding::Data);
+            assert!(matches!(result, Err(Error::BadPicture { .. })), "{w}x{h}x{c}");
+        }
+    }
+
+    #[test]
+    fn nan_is_found_unless_it_is_transparent() {
+        let mut v = vec![1.0_f32; 2 * 3 * 4];
+        v[(3 + 2) * 4 + 1] = f32::NAN;
+        let picture = |v: &[f32]| Picture::new(2, 3, 4, Samples::F32(v.to_vec()), Encoding::Linear);
+        let error = picture(&v).expect("picture").ensure_finite("it").expect_err("NaN");
+        assert!(matches!(error, Error::NotFinite { count: 1, y: 1, x: 2, .. }), "{error}");
+        v[(3 + 2) * 4 + 3] = 0.0;
+        assert!(picture(&v).expect("picture").ensure_finite("it").is_ok());
+    }
+}

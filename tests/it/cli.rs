@@ -4,6 +4,8 @@ use std::io::{BufRead as _, BufReader, Read as _};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use texforge::{Encoding, ErrorKind, Samples, TileParams};
+
 use crate::support::{Folder, PROGRAM, Pixels};
 
 /// A quick run: `texforge tile photo.png -o tile.png` and these.
@@ -182,6 +184,7 @@ mod success {
         folder.does(&quick(&[]));
         let v = json(&folder, &["info", "tile.png", "--json"]);
         assert_eq!((&v["width"], &v["type"]), (&48.into(), &"uint8".into()));
+        assert_eq!(v["record"]["params"]["size"], "48x48", "how it was made: {v}");
     }
 }
 
@@ -201,7 +204,7 @@ mod telling {
         assert_eq!(output.status.code(), Some(0));
         let help = String::from_utf8(output.stdout).expect("text");
         assert!(help.starts_with("Examples:\n"), "{help}");
-        for param in texforge::TileParams::schema() {
+        for param in TileParams::schema() {
             assert!(help.contains(&format!("--{}", param.name.replace('_', "-"))), "{help}");
         }
     }
@@ -293,6 +296,11 @@ mod refusal {
         let folder = Folder::new();
         folder.rgb("photo.png", 8, 8, 1);
         folder.refuses(&quick(&["--patch", "11"]), 1, "8x8");
+        // The same refusal by its name, for programs.
+        let photo = texforge::Picture::new(8, 8, 1, Samples::U8(vec![7; 64]), Encoding::Srgb);
+        let ctx = texforge::Ctx::new(0, 1).expect("context");
+        let error = texforge::tile(&ctx, &photo.expect("photo"), None, &TileParams::default());
+        assert_eq!(error.expect_err("too small").kind(), ErrorKind::TooSmall);
     }
 
     #[test]

@@ -12,6 +12,7 @@ mod jpeg;
 mod other;
 mod place;
 mod png;
+mod record;
 mod source_map;
 mod tiff;
 mod write;
@@ -25,6 +26,7 @@ use crate::image::material::MapKind;
 use crate::image::picture::{Encoding, Meta, Picture, Samples};
 
 pub use place::check_output;
+pub use record::read_record;
 pub use source_map::{read_source_map, write_source_map};
 pub use write::{WriteOptions, encode, write};
 
