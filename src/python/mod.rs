@@ -1,1 +1,243 @@
-//! The Python face.
+//! The Python face: the private module `texforge._texforge`, a handful of functions.
+//!
+//! It converts, enters the core through one doorway ([`enter`]) and maps errors. Names, defaults
+//! and documentation for people are in `python/texforge/_api.py`. No algorithm is in either.
+
+#![expect(clippy::needless_pass_by_value, reason = "pyo3 hands arguments over by value")]
+
+mod array;
+mod enter;
+mod error;
+
+use std::ffi::OsString;
+use std::path::PathBuf;
+
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict};
+
+use crate::base::ctx::Ctx;
+use crate::base::error::{Error, ErrorKind, Result};
+use crate::image::io::{self, Format, WriteOptions};
+use crate::image::mask::Mask;
+use crate::image::material::{self, MapKind};
+use crate::image::picture::Picture;
+use crate::image::sourcemap::SourceMap;
+use crate::verb::tile::TileParams;
+use array::{ArrayIn, ArrayOut, MapIn, MapOut, array_out, map_out};
+use error::IntoPy;
+
+/// A picture of another map of the material: name, picture, what its numbers are.
+type NamedMap<'py> = (String, ArrayIn<'py>, String);
+
+fn kind_named(name: &str) -> Result<MapKind> {
+    match name {
+        "color" => Ok(MapKind::Color),
+        "data" => Ok(MapKind::Data),
+        "normal" => Ok(MapKind::Normal),
+        _ => Err(Error::parameter("kind", "one of color, data, normal", format!("`{name}`"))),
+    }
+}
+
+/// Fails before the long work if `map` could not be gathered after it.
+fn ensure_same_shape(name: &str, map: &Picture, photo: &Picture) -> Result<()> {
+    let probe = SourceMap::new((1, 1), (photo.height(), photo.width()), vec![[0, 0]])?;
+    match probe.apply(map, MapKind::Data) {
+        Err(Error::SizeMismatch { got_w, got_h, want_w, want_h, remedy, .. }) => {
+            let what = format!("the map `{name}`");
+            Err(Error::SizeMismatch { what, got_w, got_h, want_w, want_h, remedy })
+        }
+        other => other.map(drop),
+    }
+}
+
+/// Makes a tile. Returns the picture, the source map, the gathered maps and the report as JSON.
+#[pyfunction]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "one private caller, in _api.py, passes them by name"
+)]
+#[expect(clippy::type_complexity, reason = "one private caller, in _api.py, names its parts")]
+#[pyo3(signature = (*, photo, mask, maps, params, seed, threads, progress))]
+fn tile<'py>(
+    py: Python<'py>,
+    photo: ArrayIn<'py>,
+    mask: Option<ArrayIn<'py>>,
+    maps: Vec<NamedMap<'py>>,
+    params: Vec<(String, String)>,
+    seed: u64,
+    threads: usize,
+    progress: Option<Bound<'py, PyAny>>,
+) -> PyResult<(ArrayOut<'py>, Option<MapOut<'py>>, Vec<(String, ArrayOut<'py>)>, String)> {
+    let mut settings = TileParams::default();
+    for (name, text) in &params {
+        settings.set(name, text).into_py(py)?;
+    }
+    settings.validate().into_py(py)?;
+    let photo = photo.picture(py)?;
+    let mask = match mask {
+        Some(mask) => Some(Mask::from_picture(&mask.picture(py)?).into_py(py)?),
+        None => None,
+    };
+    let mut others = Vec::with_capacity(maps.len());
+    for (name, map, kind) in &maps {
+        let map = map.picture(py)?;
+        ensure_same_shape(name, &map, &photo).into_py(py)?;
+        others.push((name.clone(), map, kind_named(kind).into_py(py)?));
+    }
+    let ctx = Ctx::new(seed, threads).into_py(py)?;
+    let job = ctx.job();
+    let (tile, gathered) = enter::enter(py, &job, progress.as_ref(), move || {
+        let tile = crate::verb::tile::tile(&ctx, &photo, mask.as_ref(), &settings)?;
+        let mut gathered = Vec::with_capacity(others.len());
+        if let Some(source_map) = &tile.source_map {
+            for (name, map, kind) in others {
+                gathered.push((name, source_map.apply(&map, kind)?));
+            }
+        }
+        Ok((tile, gathered))
+    })?;
+    let report = serde_json::to_string(&tile.report)
+        .map_err(|e| Error::Internal { message: e.to_string() })
+        .into_py(py)?;
+    let source_map = tile.source_map.as_ref().map(|map| map_out(py, map)).transpose()?;
+    let maps = gathered
+        .into_iter()
+        .map(|(name, picture)| Ok((name, array_out(py, &picture)?)))
+        .collect::<PyResult<_>>()?;
+    Ok((array_out(py, &tile.picture)?, source_map, maps, report))
+}
+
+/// Gathers a map through a source map.
+#[pyfunction]
+#[pyo3(signature = (*, source_map, picture, kind))]
+fn apply<'py>(
+    py: Python<'py>,
+    source_map: MapIn<'py>,
+    picture: ArrayIn<'py>,
+    kind: &str,
+) -> PyResult<ArrayOut<'py>> {
+    let kind = kind_named(kind).into_py(py)?;
+    let source_map = source_map.source_map(py)?;
+    let picture = picture.picture(py)?;
+    let out = enter::unheard(py, move || source_map.apply(&picture, kind))?;
+    array_out(py, &out)
+}
+
+/// Reads a picture.
+#[pyfunction]
+#[pyo3(signature = (*, path, kind))]
+fn read<'py>(py: Python<'py>, path: PathBuf, kind: &str) -> PyResult<ArrayOut<'py>> {
+    let kind = kind_named(kind).into_py(py)?;
+    let picture = enter::unheard(py, move || io::read(&path, kind))?;
+    array_out(py, &picture)
+}
+
+/// Writes a picture.
+#[pyfunction]
+#[pyo3(signature = (*, path, picture, kind, record, overwrite))]
+fn write<'py>(
+    py: Python<'py>,
+    path: PathBuf,
+    picture: ArrayIn<'py>,
+    kind: &str,
+    record: Option<String>,
+    overwrite: bool,
+) -> PyResult<()> {
+    let options = WriteOptions { kind: kind_named(kind).into_py(py)?, record, force: overwrite };
+    let picture = picture.picture(py)?;
+    enter::unheard(py, move || io::write(&path, &picture, &options))
+}
+
+/// The bytes of a PNG file of the picture.
+#[pyfunction]
+#[pyo3(signature = (*, picture))]
+fn encode_png<'py>(py: Python<'py>, picture: ArrayIn<'py>) -> PyResult<Bound<'py, PyBytes>> {
+    let picture = picture.picture(py)?;
+    let options = WriteOptions::new(MapKind::Color);
+    let bytes = enter::unheard(py, move || io::encode(&picture, Format::Png, &options))?;
+    Ok(PyBytes::new(py, &bytes))
+}
+
+/// Reads a source map.
+#[pyfunction]
+#[pyo3(signature = (*, path))]
+fn read_source_map(py: Python<'_>, path: PathBuf) -> PyResult<MapOut<'_>> {
+    let map = enter::unheard(py, move || io::read_source_map(&path))?;
+    map_out(py, &map)
+}
+
+/// Writes a source map.
+#[pyfunction]
+#[pyo3(signature = (*, path, source_map, overwrite))]
+fn write_source_map<'py>(
+    py: Python<'py>,
+    path: PathBuf,
+    source_map: MapIn<'py>,
+    overwrite: bool,
+) -> PyResult<()> {
+    let map = source_map.source_map(py)?;
+    enter::unheard(py, move || io::write_source_map(&path, &map, overwrite))
+}
+
+/// What the numbers of a material's map of this name are.
+#[pyfunction]
+fn map_kind(name: &str) -> &'static str {
+    match material::classify(name) {
+        Some((_, MapKind::Color)) => "color",
+        Some((_, MapKind::Normal)) => "normal",
+        Some((_, MapKind::Data)) | None => "data",
+    }
+}
+
+/// Every parameter of `tile`, with its default as text.
+#[pyfunction]
+fn schema(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
+    let entry = |param: crate::base::params::Param| {
+        let dict = PyDict::new(py);
+        dict.set_item("name", param.name)?;
+        dict.set_item("kind", param.kind)?;
+        dict.set_item("choices", param.choices)?;
+        dict.set_item("default", param.default)?;
+        dict.set_item("range", param.range)?;
+        dict.set_item("unit", param.unit)?;
+        dict.set_item("doc", param.doc)?;
+        Ok(dict)
+    };
+    TileParams::schema().into_iter().map(entry).collect()
+}
+
+/// The slug of every kind of error.
+#[pyfunction]
+fn error_kinds() -> Vec<&'static str> {
+    ErrorKind::ALL.into_iter().map(ErrorKind::slug).collect()
+}
+
+/// Fails inside the doorway with an error of this kind (`internal`: panics); for the tests.
+#[pyfunction]
+fn fail(py: Python<'_>, kind: String) -> PyResult<()> {
+    enter::unheard(py, move || error::example(&kind))
+}
+
+/// Runs the command line; returns the exit status.
+#[pyfunction]
+fn cli_main(py: Python<'_>, args: Vec<OsString>) -> u8 {
+    // The panic's message is on stderr already.
+    py.detach(|| std::panic::catch_unwind(|| crate::cli::run(args)).unwrap_or(1))
+}
+
+/// The private module.
+#[pymodule(gil_used = false)]
+mod _texforge {
+    #[pymodule_export]
+    use super::{
+        apply, cli_main, encode_png, error_kinds, fail, map_kind, read, read_source_map, schema,
+        tile, write, write_source_map,
+    };
+
+    use pyo3::prelude::*;
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}

@@ -1,0 +1,79 @@
+# Everything a person or CI does here. `make` alone lists it.
+
+PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11 python; do \
+	command -v $$p >/dev/null 2>&1 && $$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' \
+	>/dev/null 2>&1 && echo $$p && break; done)
+CARGO ?= cargo
+VENV := .venv
+BIN := $(VENV)/bin
+WHEELS := target/wheels
+PHOTO ?=
+EXEMPLARS ?= ../shared/exemplars
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test test-rust test-python lint format gallery bench wheel ci clean
+
+help: ## List the targets.
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+# The virtual environment with everything but texforge itself.
+$(BIN)/.ready: pyproject.toml
+	@test -n "$(PYTHON)" || { echo "texforge needs Python 3.11 or newer (with venv); install it, or name it: make PYTHON=..." >&2; exit 1; }
+	@command -v $(CARGO) >/dev/null || { echo "texforge needs Rust; install the stable toolchain" >&2; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -c 'import tomllib; p = tomllib.load(open("pyproject.toml", "rb"))["project"]; print("\n".join(p["dependencies"] + p["optional-dependencies"]["dev"]))' > $(VENV)/requirements.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r $(VENV)/requirements.txt
+	touch $@
+
+# One wheel of the profile named by the first argument, installed.
+define install_wheel
+	rm -rf $(WHEELS)/$(1)
+	$(BIN)/maturin build --quiet --profile $(1) --out $(WHEELS)/$(1)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --force-reinstall $(WHEELS)/$(1)/*.whl
+endef
+
+setup: $(BIN)/.ready ## Build optimised and install into .venv.
+	$(call install_wheel,release)
+	@echo "texforge is installed: $(BIN)/texforge --help, or $(BIN)/python -c 'import texforge'"
+
+demo: setup ## Tile a photograph (PHOTO=file to choose) and show it repeated, in demo/.
+	$(BIN)/python docs/demo.py $(if $(PHOTO),"$(PHOTO)")
+
+test: test-rust test-python ## Build and run every test.
+
+test-rust:
+	$(CARGO) test --locked
+
+# Against the installed wheel, as users have it, not the source tree.
+test-python: $(BIN)/.ready
+	$(call install_wheel,dev)
+	$(BIN)/python -m pytest
+
+lint: $(BIN)/.ready ## Check formatting, lints and types.
+	$(CARGO) fmt --check
+	$(CARGO) clippy --locked --all-targets -- -D warnings
+	$(CARGO) clippy --locked --all-targets --features python -- -D warnings
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+	$(call install_wheel,dev)
+	$(BIN)/python -m mypy.stubtest texforge --mypy-config-file pyproject.toml
+
+format: $(BIN)/.ready ## Format everything.
+	$(CARGO) fmt
+	$(BIN)/ruff format
+	$(BIN)/ruff check --fix
+
+gallery: setup ## Tile every exemplar and write contact sheets, in gallery/.
+	$(BIN)/python docs/gallery.py "$(EXEMPLARS)"
+
+bench: ## Measure the kernels.
+	$(CARGO) bench --locked
+
+wheel: $(BIN)/.ready ## Build the wheel for distribution, in dist/.
+	$(BIN)/maturin build --release --out dist
+
+ci: lint test ## What CI runs.
+
+clean: ## Remove what was built.
+	rm -rf target $(VENV) demo gallery dist

@@ -1,0 +1,77 @@
+"""texforge turns photographs into textures that can be used.
+
+`tile` makes a texture that repeats from a casual photo; the `Tile` it returns holds the picture
+and says which pixel of the photo each of its pixels is, so that other maps of the same material
+can follow (`apply`). `read_image` and `write_image` keep all the bits that files have.
+Everything raised on purpose is a `TexforgeError`.
+"""
+
+from texforge._api import apply, load_source_map, read_image, tile, write_image
+from texforge._errors import (
+    AccessError,
+    Cancelled,
+    FileError,
+    FormatError,
+    InternalError,
+    MissingFileError,
+    OutOfMemory,
+    OutputExistsError,
+    ParameterError,
+    PictureError,
+    ReadError,
+    SameFileError,
+    TexforgeError,
+)
+from texforge._texforge import __version__
+from texforge._types import (
+    Axis,
+    Costs,
+    Encoding,
+    Image,
+    ImageLike,
+    MapKind,
+    Measure,
+    Method,
+    PathType,
+    Progress,
+    ProgressBar,
+    Quality,
+    SourceMap,
+    Tile,
+)
+
+__all__ = [
+    "AccessError",
+    "Axis",
+    "Cancelled",
+    "Costs",
+    "Encoding",
+    "FileError",
+    "FormatError",
+    "Image",
+    "ImageLike",
+    "InternalError",
+    "MapKind",
+    "Measure",
+    "Method",
+    "MissingFileError",
+    "OutOfMemory",
+    "OutputExistsError",
+    "ParameterError",
+    "PathType",
+    "PictureError",
+    "Progress",
+    "ProgressBar",
+    "Quality",
+    "ReadError",
+    "SameFileError",
+    "SourceMap",
+    "TexforgeError",
+    "Tile",
+    "__version__",
+    "apply",
+    "load_source_map",
+    "read_image",
+    "tile",
+    "write_image",
+]

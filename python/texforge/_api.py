@@ -1,0 +1,484 @@
+"""The public functions: they name and document; the work is done in Rust."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping  # noqa: TC003 (the signatures can be resolved at run time)
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from texforge import _arrays, _texforge
+from texforge._errors import ParameterError
+from texforge._progress import reporting
+from texforge._types import (
+    Axis,
+    Costs,
+    Encoding,
+    Image,
+    ImageLike,
+    MapKind,
+    Measure,
+    Method,
+    PathType,
+    Progress,
+    Quality,
+    SourceMap,
+    Tile,
+)
+
+__all__ = ["apply", "load_source_map", "read_image", "tile", "write_image"]
+
+# Longest side of a notebook's picture: larger ones only slow the page down.
+_PREVIEW_SIDE = 1024
+
+
+def tile(
+    image: ImageLike,
+    *,
+    size: int | tuple[int, int] | None = None,
+    axis: Axis = "both",
+    method: Method = "stationary",
+    measure: Measure = "histogram",
+    sigma: float = 0.1,
+    patch: int = 11,
+    uniformity: float = 1.0,
+    quality: Quality = "normal",
+    seed: int = 0,
+    mask: ImageLike | None = None,
+    maps: Mapping[str, ImageLike] | None = None,
+    encoding: Encoding | Literal["auto"] = "auto",
+    threads: int | None = None,
+    progress: Progress = None,
+) -> Tile:
+    """Turn a photo into a texture that repeats without a seam and without a giveaway blob.
+
+    Every pixel of the tile is a copy of a pixel of the photo (except with the method
+    ``"make-seamless"``), bit for bit.
+
+    Parameters
+    ----------
+    image : (H, W) or (H, W, C) array_like, or Pillow image
+        The photo, as uint8, uint16, float16, float32 or float64. One channel is grey, two are
+        grey and alpha, three RGB, four RGB and alpha; any other number is data. Full scale is
+        255, 65535 or 1.0; floats may exceed it. Pixels that are not wholly opaque are never used.
+    size : int or (int, int), optional
+        **(height, width)** of the tile in pixels, as in ``image.shape``; one number makes a
+        square. By default the largest power of two that fits into the photo, at most 2048.
+    axis : {"both", "x", "y"}
+        In which directions the tile repeats: ``"x"`` horizontally only, ``"y"`` vertically only.
+    method : {"stationary", "wrap-only", "no-wrap", "make-seamless"}
+        How the tile is made. All but the first are baselines to compare with.
+    measure : {"histogram", "none"}
+        The statistic that is made equal everywhere in the tile.
+    sigma : float
+        Reach of the measure, as a fraction of the tile's shorter side, 0.01 to 1. Smaller evens
+        out smaller stains, larger keeps more variety.
+    patch : int
+        Side of the patches that are compared, in pixels; odd, 3 to 21. Larger keeps larger
+        features whole, smaller mixes more.
+    uniformity : float
+        How strongly every part of the photo is made to contribute equally, 0 (not at all) to 100.
+    quality : {"draft", "normal", "best"}
+        How much time to spend.
+    seed : int
+        Seed of all random choices, 0 to 2**64 - 1.
+    mask : (H, W) array_like, or Pillow image, optional
+        Where the photo may be used: True, or at least half of full scale (128 of 255).
+    maps : mapping of str to array_like, optional
+        Other maps of the same material by name, to be tiled the same way. The name decides what
+        a map is: base colour and emission are colours, normals are vectors (and come out with
+        unit length), everything else is data.
+    encoding : {"auto", "srgb", "linear", "data"}
+        What the photo's numbers mean: display-referred sRGB, linear light with sRGB primaries,
+        or numbers that are no colours (then there is no alpha either). ``"auto"`` is what
+        `read_image` found out about its pictures, and sRGB for all others: also for floats,
+        which usually are 8-bit pictures divided by 255, as scikit-image makes them. Say
+        ``"linear"`` for floats that come from elsewhere and are linear, such as renderings.
+    threads : int, optional
+        Number of worker threads, at most 1024; None or 0: one per core. Does not change the
+        result.
+    progress : bool, callable or bar, optional
+        True shows a tqdm bar. A function is called on this thread, with the fraction done from
+        0.0 to 1.0; returning False cancels, and exceptions pass through. An object with
+        ``update``, such as ``tqdm.tqdm(total=1.0)``, is moved on.
+
+    Returns
+    -------
+    Tile
+        The picture, the map of where each pixel came from, and what it costs.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is out of range (also a ValueError).
+    PictureError
+        If the photo, the mask or a map cannot be used: wrong type or shape, too small, NaN or
+        infinities, nothing left by the mask (also a ValueError).
+    OutOfMemory
+        If it would not fit into memory; checked first (also a MemoryError).
+    Cancelled
+        If `progress` returned False.
+    KeyboardInterrupt
+        On Ctrl-C, at once; other threads of Python run on meanwhile.
+
+    Notes
+    -----
+    The same photo, arguments and seed give the same bytes on every run and every machine, for
+    any number of threads. Arrays are copied before the work starts.
+
+    Source: J. Moritz, S. James, T. S. F. Haines, T. Ritschel, T. Weyrich, "Texture
+    Stationarization: Turning Photos into Tileable Textures", Computer Graphics Forum 36(2), 2017.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import texforge
+    >>> photo = np.random.default_rng(0).integers(0, 256, (80, 100, 3), dtype=np.uint8)
+    >>> tile = texforge.tile(photo, size=(32, 48), quality="draft")
+    >>> tile.image.shape, tile.image.dtype
+    ((32, 48, 3), dtype('uint8'))
+    >>> y, x = tile.source_map[..., 0], tile.source_map[..., 1]
+    >>> bool(np.all(tile.image == photo[y, x]))
+    True
+    """
+    photo = _arrays.picture(image, "the photo", encoding)
+    params = {
+        "size": _size_text(size),
+        "axis": _word("axis", axis),
+        "method": _word("method", method),
+        "measure": _word("measure", measure),
+        "sigma": _number("sigma", sigma),
+        "patch": str(_arrays.integer("patch", patch)),
+        "uniformity": _number("uniformity", uniformity),
+        "quality": _word("quality", quality),
+    }
+    if maps and method == "make-seamless":
+        raise ParameterError(
+            "`maps` must be empty with method 'make-seamless', which blends and so leaves nothing "
+            f"to apply to other maps, got {', '.join(map(repr, maps))}",
+            fields={"name": "maps"},
+        )
+    others = {name: _map(other, name) for name, other in (maps or {}).items()}
+    kinds = {name: _texforge.map_kind(name) for name in others}
+    with reporting(progress) as callback:
+        picture_out, map_out, maps_out, report_text = _texforge.tile(
+            photo=photo.packed(),
+            mask=None if mask is None else _arrays.mask(mask).packed(),
+            maps=[(name, other.packed(), kinds[name]) for name, other in others.items()],
+            params=list(params.items()),
+            seed=_arrays.integer("seed", seed),
+            threads=_arrays.integer("threads", threads or 0, high=1024),
+            progress=callback,
+        )
+    report = json.loads(report_text)
+    report["notes"] = [*report["notes"], *photo.notes]
+    return Tile(
+        image=photo.unpacked(picture_out),
+        source_map=None if map_out is None else _positions(map_out),
+        costs=Costs(**report["costs"]),
+        seed=report["seed"],
+        params=_typed(dict(report["params"])),
+        report=report,
+        maps={name: others[name].unpacked(parts) for name, parts in maps_out},
+        encoding=_arrays.array_encoding(picture_out[3]),
+        photo_size=(photo.array.shape[0], photo.array.shape[1]),
+    )
+
+
+def apply(
+    source_map: Tile | SourceMap | npt.ArrayLike,
+    image: ImageLike,
+    *,
+    kind: MapKind = "data",
+    source_size: tuple[int, int] | None = None,
+) -> npt.NDArray[Any]:
+    """Replay a source map on another map of the photo's material.
+
+    Parameters
+    ----------
+    source_map : Tile, SourceMap or (H, W, 2) array_like of int
+        Row and column of the photo's pixel that each pixel of the tile is a copy of.
+    image : (H', W') or (H', W', C) array_like, or Pillow image
+        The map, showing the same as the photo. At another resolution (but the same aspect ratio)
+        it is read in between its pixels, bilinearly; otherwise values are copied bit for bit.
+    kind : {"data", "color", "normal"}
+        What the map's numbers are. Normals, stored as ``(n + 1) / 2``, come out with unit length.
+    source_size : (int, int), optional
+        Height and width of the photo, for a `source_map` that is a plain array; by default
+        those of `image`.
+
+    Returns
+    -------
+    (H, W) or (H, W, C) ndarray
+        The map's tile, of the map's data type.
+
+    Raises
+    ------
+    PictureError
+        If the map has another aspect ratio than the photo, or a position lies outside.
+    ParameterError
+        If `kind` is unknown, or the tile was made by blending and so has no source map.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import texforge
+    >>> height = np.array([[0.0, 0.25], [0.5, 1.0]])
+    >>> texforge.apply([[[1, 1], [0, 1], [0, 0]]], height)
+    array([[1.  , 0.25, 0.  ]])
+    """
+    if isinstance(source_map, Tile):
+        source_map = _source_map_of(source_map)
+    if isinstance(source_map, SourceMap):
+        source_size = source_map.source_size
+    positions = _arrays.positions(source_map)
+    other = _arrays.picture(image, "the map", "auto" if kind == "color" else "data")
+    if source_size is None:
+        source_size = (other.array.shape[0], other.array.shape[1])
+    out = _texforge.apply(
+        source_map=_packed_map(positions, source_size),
+        picture=other.packed(),
+        kind=_word("kind", kind),
+    )
+    return other.unpacked(out)
+
+
+def read_image(path: PathType, *, kind: MapKind = "color") -> Image:
+    """Read a picture with all the bits it has.
+
+    Reads PNG (8 and 16 bits), JPEG, TIFF, WebP, EXR, BMP, TGA, PNM and GIF. The camera's
+    orientation is applied; colours are converted to sRGB (integers) or linear light (floats).
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    kind : {"color", "data", "normal"}
+        What its numbers are. Only colours are converted.
+
+    Returns
+    -------
+    (H, W) or (H, W, C) Image
+        An array that remembers its encoding, of uint8, uint16, float16 or float32.
+
+    Raises
+    ------
+    ReadError
+        If the file is damaged or no picture.
+    MissingFileError, AccessError, FileError
+        If the operating system refuses (also FileNotFoundError, PermissionError, OSError).
+    OutOfMemory
+        If the picture would not fit into memory.
+    """
+    parts = _texforge.read(path=_arrays.path(path), kind=_word("kind", kind))
+    array = _arrays.unpacked(parts)
+    flat = array[:, :, 0] if array.shape[2] == 1 else array
+    return Image.tagged(flat, _arrays.array_encoding(parts[3]))
+
+
+def write_image(
+    path: PathType,
+    image: ImageLike,
+    *,
+    kind: MapKind = "color",
+    encoding: Encoding | Literal["auto"] = "auto",
+    overwrite: bool = False,
+) -> None:
+    """Write a picture with all the bits it has, at once or not at all.
+
+    Parameters
+    ----------
+    path : path
+        The file; its extension decides the format.
+    image : (H, W) or (H, W, C) array_like, or Pillow image
+        The picture. What the format cannot hold is refused, never rounded away.
+    kind : {"color", "data", "normal"}
+        What its numbers are.
+    encoding : {"auto", "srgb", "linear", "data"}
+        What a colour picture's numbers mean, as for `tile`.
+    overwrite : bool
+        Whether an existing file may be replaced.
+
+    Raises
+    ------
+    OutputExistsError
+        If the file exists and `overwrite` is False (also a FileExistsError).
+    FormatError
+        If the format is unknown or cannot hold the picture.
+    MissingFileError, AccessError, FileError
+        If the operating system refuses (also FileNotFoundError, PermissionError, OSError).
+
+    Examples
+    --------
+    >>> import numpy as np, pathlib, tempfile
+    >>> import texforge
+    >>> path = pathlib.Path(tempfile.mkdtemp()) / "height.png"
+    >>> texforge.write_image(path, np.array([[0, 65535]], np.uint16), kind="data")
+    >>> texforge.read_image(path, kind="data").tolist()
+    [[0, 65535]]
+    """
+    picture = _arrays.picture(image, "the picture", encoding if kind == "color" else "data")
+    _texforge.write(
+        path=_arrays.path(path),
+        picture=picture.packed(),
+        kind=_word("kind", kind),
+        record=None,
+        overwrite=bool(overwrite),
+    )
+
+
+def load_source_map(path: PathType) -> SourceMap:
+    """Read a source map written by `Tile.save_source_map` or ``texforge tile --save-source-map``.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+
+    Returns
+    -------
+    SourceMap
+        The positions and the photo's size.
+
+    Raises
+    ------
+    ReadError
+        If the file is damaged or holds no source map.
+    MissingFileError, AccessError, FileError
+        If the operating system refuses (also FileNotFoundError, PermissionError, OSError).
+    """
+    parts = _texforge.read_source_map(path=_arrays.path(path))
+    return SourceMap(positions=_positions(parts), source_size=parts[2])
+
+
+def save_source_map(tile: Tile, path: PathType, *, overwrite: bool) -> None:
+    """See `Tile.save_source_map`."""
+    source_map = _source_map_of(tile)
+    packed = _packed_map(_arrays.positions(source_map.positions), source_map.source_size)
+    _texforge.write_source_map(
+        path=_arrays.path(path), source_map=packed, overwrite=bool(overwrite)
+    )
+
+
+def save_tile(tile: Tile, path: PathType, *, overwrite: bool) -> None:
+    """See `Tile.save`."""
+    kinds = {param["name"]: param["kind"] for param in _texforge.schema()}
+    params = {
+        name: json.loads(text) if kinds.get(name) in ("integer", "number") else text
+        for name, text in tile.report["params"]
+    }
+    # As the command line writes it, so that equal tiles make equal files.
+    made = {
+        "tool": "texforge",
+        "version": tile.report["version"],
+        "verb": "tile",
+        "seed": tile.seed,
+        "params": params,
+    }
+    _texforge.write(
+        path=_arrays.path(path),
+        picture=_arrays.picture(tile.image, "the tile", tile.encoding).packed(),
+        kind="data" if tile.encoding == "data" else "color",
+        record=json.dumps(made, sort_keys=True, separators=(",", ":")),
+        overwrite=bool(overwrite),
+    )
+
+
+def preview_png(tile: Tile) -> bytes | None:
+    """Return the tile repeated two by two as an 8-bit PNG; None for data that is no picture."""
+    image = _arrays.displayable(tile.image, tile.encoding)
+    if image is None:
+        return None
+    image = np.tile(image, (2, 2, 1))
+    # Averages whole blocks; texels at the far edge that fill no block are left out.
+    step = -(-max(image.shape[:2]) // _PREVIEW_SIDE)
+    if step > 1:
+        height, width, channels = image.shape[0] // step, image.shape[1] // step, image.shape[2]
+        blocks = image[: height * step, : width * step].reshape(height, step, width, step, channels)
+        image = blocks.mean(axis=(1, 3)).round().astype(np.uint8)
+    return bytes(_texforge.encode_png(picture=_arrays.picture(image, "the preview").packed()))
+
+
+def _source_map_of(tile: Tile) -> SourceMap:
+    if tile.source_map is None:
+        raise ParameterError(
+            "`source_map` must be that of a tile made of copied pixels, got None: the method "
+            "'make-seamless' blends; choose another method",
+            fields={"name": "source_map"},
+        )
+    return SourceMap(positions=tile.source_map, source_size=tile.photo_size)
+
+
+def _map(image: ImageLike, name: object) -> _arrays.Picture:
+    if not isinstance(name, str):
+        raise ParameterError(
+            f"`maps` must be a mapping with names as keys, got the key {name!r}",
+            fields={"name": "maps"},
+        )
+    encoding = "auto" if _texforge.map_kind(name) == "color" else "data"
+    return _arrays.picture(image, f"the map `{name}`", encoding)
+
+
+def _positions(parts: tuple[bytearray, tuple[int, int], tuple[int, int]]) -> npt.NDArray[np.int32]:
+    data, (height, width), _ = parts
+    return np.frombuffer(data, dtype=np.int32).reshape(height, width, 2)
+
+
+def _packed_map(
+    positions: npt.NDArray[np.int32], source_size: object
+) -> tuple[Any, tuple[int, int], tuple[int, int]]:
+    if not isinstance(source_size, tuple | list) or len(source_size) != 2:
+        raise ParameterError(
+            f"`source_size` must be (height, width), got {source_size!r}",
+            fields={"name": "source_size"},
+        )
+    height, width = (_arrays.integer("source_size", side, 1, 2**31) for side in source_size)
+    shape = (positions.shape[0], positions.shape[1])
+    return positions.reshape(-1).view(np.uint8), shape, (height, width)
+
+
+def _size_text(size: object) -> str:
+    if size is None:
+        return "auto"
+    sides: tuple[Any, ...] = tuple(size) if isinstance(size, tuple | list) else (size, size)
+    if len(sides) != 2:
+        raise ParameterError(
+            f"`size` must be one number or (height, width), got {size!r}", fields={"name": "size"}
+        )
+    height, width = (_arrays.integer("size", side, 1) for side in sides)
+    return f"{width}x{height}"
+
+
+def _word(name: str, value: object) -> str:
+    if not isinstance(value, str):
+        raise ParameterError(f"`{name}` must be a word, got {value!r}", fields={"name": name})
+    return value
+
+
+def _number(name: str, value: Any) -> str:
+    try:
+        return repr(float(value))
+    except (TypeError, ValueError):
+        raise ParameterError(
+            f"`{name}` must be a number, got {value!r}", fields={"name": name}
+        ) from None
+
+
+def _typed(params: dict[str, str]) -> dict[str, Any]:
+    """Return parameters that the core wrote as text in the types that `tile` takes."""
+    typed: dict[str, Any] = {}
+    for param in _texforge.schema():
+        name, text = param["name"], params.get(param["name"])
+        if text is None:
+            continue
+        if param["kind"] == "size":
+            typed[name] = None if text == "auto" else tuple(map(int, reversed(text.split("x"))))
+        elif param["kind"] == "integer":
+            typed[name] = int(text)
+        elif param["kind"] == "number":
+            typed[name] = float(text)
+        else:
+            typed[name] = text
+    return typed

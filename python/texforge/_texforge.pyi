@@ -1,0 +1,51 @@
+"""The compiled module. Private: `_api.py` is its only caller."""
+
+from collections.abc import Callable
+from typing import Any
+
+_Picture = tuple[Any, str, tuple[int, int, int], str]
+_PictureOut = tuple[bytearray, str, tuple[int, int, int], str]
+_Map = tuple[Any, tuple[int, int], tuple[int, int]]
+_MapOut = tuple[bytearray, tuple[int, int], tuple[int, int]]
+
+__all__ = [
+    "__version__",
+    "apply",
+    "cli_main",
+    "encode_png",
+    "error_kinds",
+    "fail",
+    "map_kind",
+    "read",
+    "read_source_map",
+    "schema",
+    "tile",
+    "write",
+    "write_source_map",
+]
+
+__version__: str
+
+def tile(
+    *,
+    photo: _Picture,
+    mask: _Picture | None,
+    maps: list[tuple[str, _Picture, str]],
+    params: list[tuple[str, str]],
+    seed: int,
+    threads: int,
+    progress: Callable[[float], object] | None,
+) -> tuple[_PictureOut, _MapOut | None, list[tuple[str, _PictureOut]], str]: ...
+def apply(*, source_map: _Map, picture: _Picture, kind: str) -> _PictureOut: ...
+def read(*, path: str, kind: str) -> _PictureOut: ...
+def write(
+    *, path: str, picture: _Picture, kind: str, record: str | None, overwrite: bool
+) -> None: ...
+def encode_png(*, picture: _Picture) -> bytes: ...
+def read_source_map(*, path: str) -> _MapOut: ...
+def write_source_map(*, path: str, source_map: _Map, overwrite: bool) -> None: ...
+def map_kind(name: str) -> str: ...
+def schema() -> list[dict[str, Any]]: ...
+def error_kinds() -> list[str]: ...
+def fail(kind: str) -> None: ...
+def cli_main(args: list[str]) -> int: ...

@@ -1,0 +1,263 @@
+"""The types of arguments and results."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from os import PathLike
+from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from typing import Self
+
+__all__ = [
+    "Axis",
+    "Costs",
+    "Encoding",
+    "Image",
+    "ImageLike",
+    "MapKind",
+    "Measure",
+    "Method",
+    "PathType",
+    "Progress",
+    "ProgressBar",
+    "Quality",
+    "SourceMap",
+    "Tile",
+]
+
+# Unions, not Literal["a", "b"]: mypy holds both for the same, stubtest only the union.
+Axis: TypeAlias = Literal["both"] | Literal["x"] | Literal["y"]
+"""In which directions a tile repeats."""
+Method: TypeAlias = (
+    Literal["stationary"] | Literal["wrap-only"] | Literal["no-wrap"] | Literal["make-seamless"]
+)
+"""How a tile is made."""
+Measure: TypeAlias = Literal["histogram"] | Literal["none"]
+"""The statistic that is made equal everywhere in a tile."""
+Quality: TypeAlias = Literal["draft"] | Literal["normal"] | Literal["best"]
+"""How much time to spend."""
+Encoding: TypeAlias = Literal["srgb"] | Literal["linear"] | Literal["data"]
+"""What the numbers of a picture mean."""
+MapKind: TypeAlias = Literal["color"] | Literal["data"] | Literal["normal"]
+"""What the numbers of a material's map mean."""
+PathType: TypeAlias = str | PathLike[str]
+"""Where a file is."""
+
+
+class ProgressBar(Protocol):
+    """A progress bar like tqdm's."""
+
+    def update(self, n: float, /) -> object:
+        """Move the bar on by `n`, in units of its `total` (1 if it has none)."""
+
+
+class _PillowImage(Protocol):
+    @property
+    def __array_interface__(self) -> dict[str, Any]: ...
+
+
+ImageLike: TypeAlias = npt.ArrayLike | _PillowImage
+"""Anything that `numpy.asarray` makes a picture of, or a Pillow image."""
+Progress: TypeAlias = bool | Callable[[float], object] | ProgressBar | None
+"""What `progress=` may be: see `texforge.tile`."""
+
+
+class Image(np.ndarray[Any, np.dtype[Any]]):
+    """An array that remembers what its numbers mean, as `read_image` returns it.
+
+    It is an ordinary numpy array in every other respect; ``numpy.asarray(image)`` is one without
+    the memory. What is computed from it has the same `encoding`.
+
+    Attributes
+    ----------
+    encoding : {"srgb", "linear", "data"}
+        Display-referred sRGB, linear light with sRGB primaries, or numbers that are no colours.
+    """
+
+    encoding: Encoding
+
+    def __array_finalize__(self, parent: Any) -> None:
+        """Take over the encoding of the array that this one is made from."""
+        self.encoding = getattr(parent, "encoding", "srgb")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle with the encoding."""
+        return Image.tagged, (np.array(self), self.encoding)
+
+    @classmethod
+    def tagged(cls, array: npt.NDArray[Any], encoding: Encoding) -> Self:
+        """Return a view of `array` that says what its numbers mean."""
+        image = array.view(cls)
+        image.encoding = encoding
+        return image
+
+
+@dataclasses.dataclass(frozen=True)
+class Costs:
+    """What a tile costs, measured on the finished picture; lower is better.
+
+    Attributes
+    ----------
+    texture : float or None
+        Mean squared CIE L*a*b* distance, per pixel of a patch, between the tile's patches and
+        the photo's patches that they were copied from. High where copies do not fit together.
+        None for the method ``"make-seamless"``, which blends.
+    stationarity : float
+        Mean earth mover's distance between the local histograms of two places of the tile, in
+        CIE L*a*b* units. High where one part of the tile looks different from another.
+    """
+
+    texture: float | None
+    stationarity: float
+
+    def __str__(self) -> str:
+        """Say both in words."""
+        texture = "" if self.texture is None else f"texture cost {self.texture:.3g}, "
+        return f"{texture}stationarity cost {self.stationarity:.3g}"
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class SourceMap:
+    """Where every pixel of a texture comes from.
+
+    ``numpy.asarray(source_map)`` is `positions`.
+
+    Attributes
+    ----------
+    positions : (H, W, 2) ndarray of int32
+        Row and column of the photo's pixel that each pixel is a copy of.
+    source_size : (int, int)
+        Height and width of the photo.
+    """
+
+    positions: npt.NDArray[np.int32]
+    source_size: tuple[int, int]
+
+    def __array__(self, dtype: Any = None, *, copy: bool | None = None) -> npt.NDArray[Any]:
+        """Return the positions."""
+        array: npt.NDArray[Any] = np.asarray(self.positions, dtype=dtype)
+        return array.copy() if copy and array is self.positions else array
+
+    def apply(self, image: ImageLike, *, kind: MapKind = "data") -> npt.NDArray[Any]:
+        """Make another map of the photo's material match: see `texforge.apply`."""
+        from texforge import _api
+
+        return _api.apply(self, image, kind=kind)
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Tile:
+    """A texture that repeats, made by `texforge.tile`.
+
+    In a notebook it shows itself repeated two by two.
+
+    Attributes
+    ----------
+    image : (H, W) or (H, W, C) ndarray
+        The tile, with the data type and the number of channels of the photo.
+    source_map : (H, W, 2) ndarray of int32, or None
+        Row and column of the photo's pixel that each pixel is a copy of, so that
+        ``image == photo[source_map[..., 0], source_map[..., 1]]``. None for the method
+        ``"make-seamless"``, which blends.
+    costs : Costs
+        How well it went.
+    seed : int
+        Seed of all random choices.
+    params : dict
+        Every parameter that `texforge.tile` used, with `size` as (height, width).
+    report : dict
+        How the tile was made, as ``texforge tile --json`` reports it: version, seconds, notes
+        and so on. Sizes in it are (width, height).
+    maps : dict
+        The other maps of the material that were given, matching `image`.
+    encoding : {"srgb", "linear", "data"}
+        What the numbers of `image` mean.
+    photo_size : (int, int)
+        Height and width of the photo.
+    """
+
+    image: npt.NDArray[Any]
+    source_map: npt.NDArray[np.int32] | None
+    costs: Costs
+    seed: int
+    params: dict[str, Any]
+    report: dict[str, Any]
+    maps: dict[str, npt.NDArray[Any]]
+    encoding: Encoding
+    photo_size: tuple[int, int]
+
+    def apply(self, image: ImageLike, *, kind: MapKind = "data") -> npt.NDArray[Any]:
+        """Make another map of the photo's material match the tile.
+
+        Parameters
+        ----------
+        image : array_like
+            The map, showing the same as the photo; of any resolution with its aspect ratio.
+        kind : {"data", "color", "normal"}
+            What its numbers are. Normals come out with unit length.
+
+        Returns
+        -------
+        ndarray
+            The map's tile, of the map's data type.
+
+        Raises
+        ------
+        PictureError
+            If the map has another aspect ratio than the photo.
+        ParameterError
+            If the tile was made by blending, and so has no source map.
+        """
+        from texforge import _api
+
+        return _api.apply(self, image, kind=kind)
+
+    def save(self, path: PathType, *, overwrite: bool = False) -> None:
+        """Write the tile to a file that also records how it was made.
+
+        Parameters
+        ----------
+        path : path
+            The file; its extension decides the format.
+        overwrite : bool
+            Whether an existing file may be replaced.
+
+        Raises
+        ------
+        OutputExistsError
+            If the file exists and `overwrite` is False.
+        FormatError
+            If the format is unknown or cannot hold the picture as it is.
+        """
+        from texforge import _api
+
+        _api.save_tile(self, path, overwrite=overwrite)
+
+    def save_source_map(self, path: PathType, *, overwrite: bool = False) -> None:
+        """Write the source map to a file, for `texforge.load_source_map`.
+
+        ``texforge apply`` on the command line reads it too.
+        """
+        from texforge import _api
+
+        _api.save_source_map(self, path, overwrite=overwrite)
+
+    def tiled(self, rows: int = 3, columns: int = 3) -> npt.NDArray[Any]:
+        """Return the image repeated `rows` times downwards and `columns` times to the right."""
+        return np.tile(self.image, (rows, columns) + (1,) * (self.image.ndim - 2))
+
+    def __repr__(self) -> str:
+        """Say what it is in one line."""
+        height, width = self.image.shape[:2]
+        return f"Tile({height} x {width} {self.image.dtype}, {self.costs}, seed {self.seed})"
+
+    def _repr_png_(self) -> bytes | None:
+        """Return the tile repeated two by two, for notebooks."""
+        from texforge import _api
+
+        return _api.preview_png(self)

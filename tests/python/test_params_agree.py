@@ -1,0 +1,55 @@
+"""A default is written once, in Rust; the Python signature is a copy, compared here."""
+
+from __future__ import annotations
+
+import inspect
+import typing
+
+import texforge
+from texforge import _texforge
+
+
+def test_names_order_and_defaults_are_those_of_the_core() -> None:
+    signature = inspect.signature(texforge.tile)
+    options = [p for p in signature.parameters.values() if p.kind is p.KEYWORD_ONLY]
+    schema = _texforge.schema()
+    assert [p.name for p in options][: len(schema)] == [entry["name"] for entry in schema]
+    for option, entry in zip(options, schema, strict=False):
+        shown = "auto" if option.default is None else option.default
+        if entry["kind"] == "number":
+            assert float(entry["default"]) == shown
+        else:
+            assert entry["default"] == str(shown)
+
+
+def test_the_words_accepted_are_those_of_the_core() -> None:
+    hints = typing.get_type_hints(texforge.tile)
+    choices = {e["name"]: tuple(e["choices"]) for e in _texforge.schema() if e["choices"]}
+    assert choices
+    for name, words in choices.items():
+        alternatives = typing.get_args(hints[name])
+        assert tuple(typing.get_args(a)[0] for a in alternatives) == words
+
+
+def test_everything_but_the_picture_is_keyword_only() -> None:
+    for function in (texforge.tile, texforge.apply, texforge.read_image, texforge.write_image):
+        for parameter in inspect.signature(function).parameters.values():
+            optional = parameter.default is not parameter.empty
+            assert (parameter.kind is parameter.KEYWORD_ONLY) == optional, parameter
+
+
+def test_every_parameter_is_documented() -> None:
+    doc = inspect.getdoc(texforge.tile)
+    assert doc is not None
+    for name in inspect.signature(texforge.tile).parameters:
+        assert f"\n{name} : " in doc
+
+
+def test_ranges_in_the_docs_are_those_of_the_core() -> None:
+    doc = " ".join((inspect.getdoc(texforge.tile) or "").split())
+    for entry in _texforge.schema():
+        if entry["range"]:
+            low, high = entry["range"].split(" to ")
+            text = doc[doc.index(f" {entry['name']} : ") :][:260]
+            assert low in text, entry
+            assert high in text, entry

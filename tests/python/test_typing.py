@@ -1,0 +1,55 @@
+"""Uses of the package as a caller writes them; `mypy --strict` reads this, pytest runs it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, assert_type
+
+import numpy as np
+import numpy.typing as npt
+import texforge
+from PIL import Image
+from tqdm import tqdm
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+
+def test_a_tile_from_everything(tmp_path: Path) -> None:
+    photo: npt.NDArray[np.uint8] = np.random.default_rng(0).integers(
+        0, 256, (48, 64, 3), dtype=np.uint8
+    )
+    tile = texforge.tile(photo, size=(24, 32), patch=5, quality="draft", seed=1, threads=1)
+    assert_type(tile, texforge.Tile)
+    assert_type(tile.image, npt.NDArray[Any])
+    assert_type(tile.source_map, npt.NDArray[np.int32] | None)
+    assert_type(tile.costs.texture, float | None)
+    assert_type(tile.apply(photo, kind="color"), npt.NDArray[Any])
+    assert_type(tile.maps, dict[str, npt.NDArray[Any]])
+    texforge.tile(Image.fromarray(photo), size=24, patch=5, mask=photo[..., 0] >= 0)
+    texforge.tile(photo, size=24, patch=5, maps={"height": photo[..., 0]}, progress=print)
+    with tqdm(total=1.0, disable=True) as bar:
+        texforge.tile(photo, size=24, patch=5, progress=bar)
+    tile.save(tmp_path / "tile.png")
+    tile.save_source_map(str(tmp_path / "map.exr"))
+    assert_type(texforge.read_image(tmp_path / "tile.png"), texforge.Image)
+    loaded = texforge.load_source_map(tmp_path / "map.exr")
+    assert_type(loaded, texforge.SourceMap)
+    assert_type(texforge.apply(loaded, photo), npt.NDArray[Any])
+
+
+def test_wrong_words_are_type_errors(photo: npt.NDArray[np.uint8]) -> None:
+    # mypy complains about an ignore that is not needed: each line proves that it objects.
+    wrong: list[texforge.TexforgeError] = []
+    calls: tuple[Callable[[], texforge.Tile], ...] = (
+        lambda: texforge.tile(photo, axis="z"),  # type: ignore[arg-type]
+        lambda: texforge.tile(photo, quality="fast"),  # type: ignore[arg-type]
+        lambda: texforge.tile(photo, size="64"),  # type: ignore[arg-type]
+        lambda: texforge.tile(photo, progress=3),  # type: ignore[arg-type]
+    )
+    for call in calls:
+        try:
+            call()
+        except texforge.ParameterError as error:
+            wrong.append(error)
+    assert len(wrong) == 4
