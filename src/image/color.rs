@@ -194,6 +194,7 @@ impl Components {
                 }
             }
         }
+        let total: f64 = (0..c).map(|k| covariance[k * c + k]).sum();
         let mut axes: Vec<Vec<f64>> = Vec::new();
         for _ in 0..3 {
             let mut axis: Vec<f64> = (0..c).map(|k| 1.0 + k as f64 / c as f64).collect();
@@ -205,7 +206,8 @@ impl Components {
                     next.iter_mut().zip(done).for_each(|(u, v)| *u -= along * v);
                 }
                 let norm = next.iter().map(|v| v * v).sum::<f64>().sqrt();
-                let scale = if norm > f64::MIN_POSITIVE { 1.0 / norm } else { 0.0 };
+                // What is left of no variance is rounding; it has no direction.
+                let scale = if norm > 1e-9 * total { 1.0 / norm } else { 0.0 };
                 next.iter_mut().for_each(|v| *v *= scale);
                 axis = next;
             }

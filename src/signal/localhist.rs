@@ -210,8 +210,9 @@ impl LocalDistributions {
         top + (bottom - top) * fy
     }
 
-    /// The typical local distribution: the median over all places of each quantile.
-    pub fn typical(&self) -> Quantiles {
+    /// The typical local distribution: the median over all places of each quantile. `None` if
+    /// no place has a usable sample.
+    pub fn typical(&self) -> Option<Quantiles> {
         let edges = self.bins.n + 1;
         let places: Vec<Quantiles> = self
             .cdf
@@ -219,7 +220,7 @@ impl LocalDistributions {
             .filter(|cdf| cdf[edges - 1] > 0.0)
             .map(|cdf| Distribution::from_cumulative(self.bins, cdf.to_vec()).quantiles())
             .collect();
-        Quantiles::median(&places)
+        (!places.is_empty()).then(|| Quantiles::median(&places))
     }
 
     /// Mean earth mover's distance between the distributions of two cells, over all pairs.

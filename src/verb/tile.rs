@@ -24,8 +24,9 @@ const MAX_TILE_SIDE: usize = 32_768;
 /// Size of the tile.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Size {
-    /// The largest power of two that fits into the photo, at most 2048; square unless the photo
-    /// is at least twice as long as it is wide.
+    /// The largest power of two that is at most a tenth larger than the photo's shorter side, at
+    /// most 2048; not square if the photo is at least twice as long as it is wide. With
+    /// [`Method::MakeSeamless`], the photo's own size.
     Auto,
     /// This many pixels.
     Pixels {
@@ -110,7 +111,7 @@ choice! {
 params! {
     /// Parameters of [`tile`].
     pub struct TileParams for "tile" {
-        /// Size of the tile: WIDTHxHEIGHT, or auto for the largest power of two that fits into the photo.
+        /// Size of the tile: WIDTHxHEIGHT, or auto for the largest power of two that about fits into the photo.
         size: Size = Size::Auto, unit "px";
         /// In which directions the tile repeats.
         axis: Axis = Axis::Both;
@@ -182,7 +183,10 @@ impl TileParams {
         if let Size::Pixels { width, height } = self.size {
             return (width, height);
         }
-        let pow2 = |n: usize| (1 << n.max(1).ilog2()).min(2048);
+        if self.method == Method::MakeSeamless {
+            return (photo_width, photo_height);
+        }
+        let pow2 = |n: usize| (1 << (n.max(1) * 11 / 10).max(1).ilog2()).min(2048);
         let (w, h) = (photo_width.max(1), photo_height.max(1));
         if w >= 2 * h || h >= 2 * w {
             return (pow2(w), pow2(h));

@@ -155,21 +155,21 @@ fn level(
     image.fill_rows(|y, row| {
         row.iter_mut().zip(&lab[y * ew..]).for_each(|(px, &lab)| *px = codes.encode(lab));
     });
-    let step = (lab.len() / 200_000).max(1);
-    let sample: Vec<Pixel> = (0..lab.len())
-        .step_by(step)
-        .filter(|&i| usable.is_none_or(|u| u[i]))
-        .map(|i| lab[i])
-        .collect();
+    let source = Source::new(image, patch, usable)?;
+    let usable_pixels: Vec<usize> =
+        (0..lab.len()).filter(|&i| usable.is_none_or(|u| u[i])).collect();
+    let step = (usable_pixels.len() / 200_000).max(1);
+    let sample: Vec<Pixel> = usable_pixels.iter().step_by(step).map(|&i| lab[i]).collect();
     let quantiles = std::array::from_fn(|k| {
         let bins = Bins::covering(sample.iter().map(|px| px[k]), 256);
-        if typical && k < CONTRAST {
+        let typical = (typical && k < CONTRAST).then(|| {
             let domain = Domain { height: eh, width: ew, wrap_y: false, wrap_x: false };
             let sigma = TYPICAL_WINDOW * eh.min(ew) as f64;
             LocalDistributions::new(&lab, usable, k, domain, sigma, bins).typical()
-        } else {
-            Distribution::of(sample.iter().map(|px| px[k]), bins).quantiles()
-        }
+        });
+        typical
+            .flatten()
+            .unwrap_or_else(|| Distribution::of(sample.iter().map(|px| px[k]), bins).quantiles())
     });
     let variance: f64 = (0..3)
         .map(|k| {
@@ -182,7 +182,6 @@ fn level(
     let usage_unit =
         (USAGE_SHARE * variance * (codes.scale * codes.scale) as f64 * (patch * patch) as f64)
             as f32;
-    let source = Source::new(image, patch, usable)?;
     Some(Level { size, source, codes, quantiles, usage_unit })
 }
 
