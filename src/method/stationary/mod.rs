@@ -128,7 +128,7 @@ fn effort(plan: &Plan, level: &Level, coarsest: bool) -> (u32, Search) {
     if coarsest {
         (plan.coarse_iterations, Search { pass: 0, radius: 0, n_random: 8 })
     } else {
-        (plan.fine_iterations, Search { pass: 0, radius: 64, n_random: 4 })
+        (plan.fine_iterations, Search { pass: 0, radius: 32, n_random: 2 })
     }
 }
 
