@@ -61,7 +61,8 @@ def lightness(picture: Image.Image) -> npt.NDArray[np.float64]:
     srgb = np.asarray(picture, dtype=np.float64) / 255
     linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
     y = linear @ np.array([0.2126, 0.7152, 0.0722])
-    return np.where(y > 216 / 24389, 116 * np.cbrt(y) - 16, y * 24389 / 27)
+    star: npt.NDArray[np.float64] = np.where(y > 216 / 24389, 116 * np.cbrt(y) - 16, y * 24389 / 27)
+    return star
 
 
 def gradient(picture: Image.Image, used: npt.NDArray[np.bool_]) -> float:
@@ -114,7 +115,7 @@ def row(path: Path, out: Path, seed: int, side: int, page: Page) -> list[contact
     limit = round(3 * side * scale)
     shown = scaled(seen, scale)
     if max(shown.size) > limit:
-        label += ", its middle" if min(shown.size) >= limit else ", cut"
+        label += ", its middle"
         shown = middle(shown, limit, limit)
     cells: list[contact.Cell] = [(label, shown)]
     for method in METHODS:
@@ -151,7 +152,7 @@ def row(path: Path, out: Path, seed: int, side: int, page: Page) -> list[contact
 
 def write_index(out: Path, pages: list[Page]) -> None:
     """Write the page that shows all sheets and numbers."""
-    head = "photo method seed texture stationarity sharpness seconds".split()
+    head = ["photo", "method", "seed", "texture", "stationarity", "sharpness", "seconds"]
     parts = ["<!doctype html><meta charset=utf-8><title>texforge gallery</title>"]
     parts.append(
         "<style>body{font:14px sans-serif;margin:2em}img{max-width:100%}"

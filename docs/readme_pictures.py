@@ -15,8 +15,8 @@ import texforge
 from PIL import Image
 
 OUT = Path(__file__).parent / "pictures"
-SCALE = 0.6
-SIDE = 256
+SCALE = 0.4
+SIDE = 384
 
 
 def stained(photo: texforge.Image) -> texforge.Image:
@@ -24,7 +24,7 @@ def stained(photo: texforge.Image) -> texforge.Image:
     y, x = np.mgrid[: photo.shape[0], : photo.shape[1]] / photo.shape[0]
     wobble = 0.04 * np.sin(9 * x + 4 * y) + 0.03 * np.cos(13 * y - 5 * x)
     light = np.ones(photo.shape)
-    for (cy, cx), radius, depth in (((0.36, 0.62), 0.2, 0.62), ((0.8, 0.2), 0.08, 0.5)):
+    for (cy, cx), radius, depth in (((0.36, 0.62), 0.2, 0.62), ((0.8, 0.2), 0.08, 0.333)):
         distance = np.hypot(y - cy, x - cx) + wobble
         light *= 1 - depth / (1 + np.exp((distance - radius) / 0.025))
     return texforge.Image.tagged(np.rint(np.asarray(photo) * light).astype(np.uint8), "srgb")
@@ -46,7 +46,7 @@ def save(name: str, rows: list[list[contact.Cell]]) -> None:
 
 def main() -> None:
     """Write the pictures."""
-    data = {name: getattr(skimage.data, name)() for name in ("gravel", "grass", "brick")}
+    data = {name: getattr(skimage.data, name)() for name in ("gravel", "brick")}
     photos = {name: texforge.Image.tagged(array, "srgb") for name, array in data.items()}
     rows: list[list[contact.Cell]] = []
     for name, photo in photos.items():
@@ -64,12 +64,12 @@ def main() -> None:
         save(f"{name}.jpg", [row])
 
     photo = stained(photos["gravel"])
-    cells: list[contact.Cell] = [("photo with a stain, 512 x 512", small(photo, 0.5))]
+    cells: list[contact.Cell] = [("photo with a stain, 512 x 512", small(photo, 0.333))]
     for method, label in (("wrap-only", "wrap-only: no seam"), ("stationary", "stationary")):
         tile = texforge.tile(photo, size=SIDE, method=method)  # type: ignore[arg-type]
         print(f"stained gravel, {method}: {tile.costs}")
         cost = tile.costs.stationarity
-        cells.append((f"{label}; cost {cost:.2f}; 3 x 3", small(tile.tiled(), 0.5)))
+        cells.append((f"{label}; cost {cost:.2f}; 3 x 3", small(tile.tiled(), 0.333)))
     save("stain.jpg", [cells])
 
 
