@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import html
+import re
 import sys
 import time
 from pathlib import Path
@@ -25,7 +26,28 @@ if TYPE_CHECKING:
 
 METHODS: tuple[texforge.Method, ...] = ("wrap-only", "stationary")
 SUFFIXES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".exr"}
-OTHER_MAPS = ("normal", "_nor", "nrm", "rough", "height", "disp", "_ao", "occlusion", "metal")
+OTHER_MAPS = set(
+    [
+        "ao",
+        "arm",
+        "orm",
+        "disp",
+        "displacement",
+        "height",
+        "metal",
+        "metallic",
+        "nor",
+        "normal",
+        "normalgl",
+        "normaldx",
+        "nrm",
+        "occlusion",
+        "opacity",
+        "rough",
+        "roughness",
+    ]
+)
+"""Words in the names of files that are no base colours."""
 SHRINK = 4
 """Photos whose shorter side is longer than this many tiles are made smaller first."""
 
@@ -190,10 +212,11 @@ def main() -> int:
     for path in sorted(folder.rglob("*")):
         parts = path.relative_to(folder).parts
         name = parts[0] if len(parts) > 1 else folder.name
+        words = set(re.split(r"[-_. ]", path.stem.lower()))
         wanted = path.suffix.lower() in SUFFIXES and arguments.only in str(path)
         if arguments.classes and name not in arguments.classes:
             continue
-        if wanted and not any(word in path.name.lower() for word in OTHER_MAPS):
+        if wanted and not words & OTHER_MAPS:
             classes.setdefault(name, []).append(path)
     pages = []
     for name, paths in classes.items():
