@@ -26,26 +26,9 @@ if TYPE_CHECKING:
 
 METHODS: tuple[texforge.Method, ...] = ("wrap-only", "stationary")
 SUFFIXES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".exr"}
-OTHER_MAPS = set(
-    [
-        "ao",
-        "arm",
-        "orm",
-        "disp",
-        "displacement",
-        "height",
-        "metal",
-        "metallic",
-        "nor",
-        "normal",
-        "normalgl",
-        "normaldx",
-        "nrm",
-        "occlusion",
-        "opacity",
-        "rough",
-        "roughness",
-    ]
+OTHER_MAPS = re.compile(
+    r"(^|[-_. ])(ao|arm|orm|disp|displacement|height|metal|metallic|nor|normal|normalgl|normaldx"
+    r"|nrm|occlusion|opacity|rough|roughness)([-_. ]|$)"
 )
 """Words in the names of files that are no base colours."""
 SHRINK = 4
@@ -212,11 +195,10 @@ def main() -> int:
     for path in sorted(folder.rglob("*")):
         parts = path.relative_to(folder).parts
         name = parts[0] if len(parts) > 1 else folder.name
-        words = set(re.split(r"[-_. ]", path.stem.lower()))
         wanted = path.suffix.lower() in SUFFIXES and arguments.only in str(path)
         if arguments.classes and name not in arguments.classes:
             continue
-        if wanted and not words & OTHER_MAPS:
+        if wanted and not OTHER_MAPS.search(path.stem.lower()):
             classes.setdefault(name, []).append(path)
     pages = []
     for name, paths in classes.items():
