@@ -30,8 +30,8 @@ const CONTRAST: usize = 3;
 /// concrete falls to half the photo's), and at 1 outliers come back.
 const CONTRAST_PULL: f32 = 0.5;
 
-/// Sweeps of the seam placement; after four hardly a pixel moves.
-const SEAM_SWEEPS: u32 = 4;
+/// Sweeps of the seam placement; after three hardly a pixel moves.
+const SEAM_SWEEPS: u32 = 3;
 
 /// What to make, and how hard to try.
 #[derive(Debug, Clone)]
