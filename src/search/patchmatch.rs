@@ -11,10 +11,13 @@ use crate::base::error::Result;
 use crate::base::rng::Rng;
 use crate::search::field::{Field, Pos};
 use crate::search::patch::{Kernel, MatchImage, WithKernel, with_kernel};
-use crate::search::source::{Source, UNUSABLE};
+use crate::search::source::Source;
 
 /// Rows of a band. Fewer rows: more parallel work, slower propagation between bands.
 const BAND: usize = 32;
+
+/// Most random candidates a pixel.
+const MAX_RANDOM: usize = 16;
 
 /// Which axes of the output wrap around.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,7 +35,7 @@ pub struct Search {
     pub pass: u32,
     /// Radius of the widest random search in pixels; 0 means the whole source.
     pub radius: usize,
-    /// Number of random candidates a pixel; each has half the radius of the one before.
+    /// Number of random candidates a pixel, at most 16; each has half the radius of the one before.
     pub n_random: u32,
 }
 
@@ -198,88 +201,83 @@ impl Band<'_> {
         let (height, width) = (self.field.height, self.field.width);
         let n_rows = rows.len() / width;
         let backward = self.search.pass % 2 == 1;
+        let d: isize = if backward { -1 } else { 1 };
+        let radii = self.radii();
         let mut query = kernel.query();
+        let mut candidates = [Pos::new(0, 0); 3 + MAX_RANDOM];
         for step in 0..n_rows {
             let row = if backward { n_rows - 1 - step } else { step };
             let y = y0 + row;
+            // The row that the scan has just left, or the last pass left beyond the band.
+            let above: Option<Vec<Pos>> = neighbor(y, -d, height, self.wrap.y).map(|ny| {
+                let inside = ny >= y0 && ny < y0 + n_rows;
+                let from =
+                    if inside { &rows[(ny - y0) * width..] } else { &self.field.pos[ny * width..] };
+                from[..width].to_vec()
+            });
+            let row = &mut rows[row * width..(row + 1) * width];
+            let end = if backward { 0 } else { width - 1 };
+            let mut beside = self.wrap.x.then(|| row[end]);
             for step in 0..width {
                 let x = if backward { width - 1 - step } else { step };
                 kernel.hold(&mut query, self.target, y * self.target.width() + x);
-                let own = rows[row * width + x];
-                let mut best = (self.score(kernel, &query, own), own);
-
-                // The neighbours that the scan has just left, shifted back.
-                let d: isize = if backward { -1 } else { 1 };
-                let beside = neighbor(x, -d, width, self.wrap.x).map(|nx| rows[row * width + nx]);
-                let above = neighbor(y, -d, height, self.wrap.y).map(|ny| {
-                    let inside = ny >= y0 && ny < y0 + n_rows;
-                    if inside {
-                        rows[(ny - y0) * width + x]
-                    } else {
-                        self.field.pos[ny * width + x]
+                let own = row[x];
+                candidates[0] = own;
+                let mut n = 1;
+                let neighbors = [
+                    beside.and_then(|p| p.shifted(0, d, self.source)),
+                    above.as_ref().and_then(|row| row[x].shifted(d, 0, self.source)),
+                ];
+                for candidate in neighbors.into_iter().flatten() {
+                    if candidate != own {
+                        candidates[n] = candidate;
+                        n += 1;
                     }
-                });
-                let beside = beside.and_then(|p| p.shifted(0, d, self.source));
-                let above = above.and_then(|p| p.shifted(d, 0, self.source));
-                for candidate in [beside, above].into_iter().flatten() {
-                    self.consider(kernel, &query, candidate, &mut best);
                 }
-
-                if self.search.n_random > 0 {
-                    self.random_search(kernel, &query, y * width + x, &mut best);
+                self.random_candidates(own, &radii, y * width + x, &mut candidates[n..]);
+                n += radii.len();
+                // All are scored before any is chosen: nothing waits for a comparison, and the
+                // memory of one patch is fetched while another is multiplied. The first of equals
+                // wins.
+                let mut best = i64::MAX;
+                for (i, &candidate) in candidates[..n].iter().enumerate() {
+                    let score = self.score(kernel, &query, candidate);
+                    best = best.min((i64::from(score) << 8) | i as i64);
                 }
-                rows[row * width + x] = best.1;
+                row[x] = candidates[(best & 0xff) as usize];
+                beside = Some(row[x]);
             }
             ctx.step(width as u64)?;
         }
         Ok(())
     }
 
+    /// Radius of each random candidate.
+    fn radii(&self) -> Vec<i32> {
+        let whole = self.source.rows().max(self.source.cols());
+        let widest = if self.search.radius == 0 { whole } else { self.search.radius.min(whole) };
+        let n = self.search.n_random.min(MAX_RANDOM as u32);
+        (0..n).map(|i| (widest as i32 >> i).max(1)).collect()
+    }
+
+    /// Positions around `own`, one a radius.
     #[inline(always)]
-    fn random_search<K: Kernel>(
-        &self,
-        kernel: K,
-        query: &K::Query,
-        item: usize,
-        best: &mut (i32, Pos),
-    ) {
+    fn random_candidates(&self, own: Pos, radii: &[i32], item: usize, out: &mut [Pos]) {
         const STAGE: u32 = 3;
         let mut rng = Rng::new(self.seed, STAGE, self.search.pass, item as u64);
         let (rows, cols) = (self.source.rows() as i32, self.source.cols() as i32);
-        let mut radius = if self.search.radius == 0 {
-            rows.max(cols)
-        } else {
-            (self.search.radius as i32).min(rows.max(cols))
-        };
-        for _ in 0..self.search.n_random {
-            let (y, x) = (best.1.y() as i32, best.1.x() as i32);
+        let (y, x) = (own.y() as i32, own.x() as i32);
+        for (&radius, out) in radii.iter().zip(out) {
             let (y_low, y_high) = ((y - radius).max(0), (y + radius).min(rows - 1));
             let (x_low, x_high) = ((x - radius).max(0), (x + radius).min(cols - 1));
             let y = y_low + rng.below((y_high - y_low + 1) as u32) as i32;
             let x = x_low + rng.below((x_high - x_low + 1) as u32) as i32;
-            self.consider(kernel, query, Pos::new(y as usize, x as usize), best);
-            radius = (radius / 2).max(1);
+            *out = Pos::new(y as usize, x as usize);
         }
     }
 
-    #[inline(always)]
-    fn consider<K: Kernel>(
-        &self,
-        kernel: K,
-        query: &K::Query,
-        candidate: Pos,
-        best: &mut (i32, Pos),
-    ) {
-        if candidate == best.1 || self.source.bias(candidate) == UNUSABLE {
-            return;
-        }
-        let score = self.score(kernel, query, candidate);
-        if score < best.0 {
-            *best = (score, candidate);
-        }
-    }
-
-    /// Squared distance less the constant `|f|^2`, plus the usage cost.
+    /// Squared distance less the constant `|f|^2`, plus the usage cost. Unusable patches score
+    /// beyond all others: every field starts with usable ones, and keeps them.
     #[inline(always)]
     fn score<K: Kernel>(&self, kernel: K, query: &K::Query, pos: Pos) -> i32 {
         let dot = kernel.dot(query, &self.source.image, self.source.at(pos));
