@@ -244,7 +244,7 @@ pub fn tile(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, params: &TileParams
         costs,
         seconds: vec![
             ("synthesis", made.as_secs_f64()),
-            ("costs", (start.elapsed() - made).as_secs_f64()),
+            ("costs", start.elapsed().saturating_sub(made).as_secs_f64()),
         ],
         notes,
     };
