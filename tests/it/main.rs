@@ -3,5 +3,6 @@
 mod cli;
 mod house;
 mod io;
+mod search;
 #[path = "../support/mod.rs"]
 mod support;

@@ -1,5 +1,7 @@
 //! Small pictures made by code, folders that notice what is written into them, runs of the program.
 
+pub(crate) mod exemplar;
+
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
 use std::io::Cursor;
