@@ -293,7 +293,7 @@ mod extremes {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(64))]
+        #![proptest_config(ProptestConfig::with_cases(128))]
         /// Whatever is asked: a tile of usable pixels, or an error that is the asker's.
         #[test]
         fn whatever_is_asked(
