@@ -313,3 +313,72 @@ mod likeness {
         assert!(with < 0.7 * without, "variation of use: {with:.2} with, {without:.2} without");
     }
 }
+
+mod costs {
+    use super::*;
+    use texforge::analyze::texture::cost_bound;
+    use texforge::image::color::ColorModel;
+    use texforge::search::patchmatch::Wrap;
+    use texforge::{MapKind, Quality};
+
+    const PATCH: usize = 5;
+
+    /// Paper eq. 5 by its definition: for every patch of the torus the nearest of all the photo's.
+    fn exact(photo: &Picture, tile: &Picture) -> f64 {
+        let lab = |picture: &Picture| {
+            let model = ColorModel::new(photo);
+            let mut lab = model.averaging_pixels(picture);
+            model.space().convert_row(&mut lab);
+            lab
+        };
+        let (e, f) = (lab(photo), lab(tile));
+        let (h, w) = (tile.height(), tile.width());
+        let distance = |ty: usize, tx: usize, sy: usize, sx: usize| {
+            let mut sum = 0.0;
+            for d in 0..PATCH * PATCH {
+                let (dy, dx) = (d / PATCH, d % PATCH);
+                let a = f[(ty + dy) % h * w + (tx + dx) % w];
+                let b = e[(sy + dy) * photo.width() + sx + dx];
+                sum += (0..3).map(|k| f64::from(a[k] - b[k]).powi(2)).sum::<f64>();
+            }
+            sum
+        };
+        let nearest = |i: usize| {
+            let (rows, cols) = (photo.height() - PATCH + 1, photo.width() - PATCH + 1);
+            let all = (0..rows * cols).map(|j| distance(i / w, i % w, j / cols, j % cols));
+            all.fold(f64::MAX, f64::min)
+        };
+        let sum: f64 = (0..h * w).map(nearest).sum();
+        sum / (h * w * PATCH * PATCH) as f64
+    }
+
+    #[test]
+    fn the_reported_texture_cost_bounds_the_exact_one() {
+        for photo in [grain(40, 44, 1), pebbles(40, 44, 2), stained(40, 44, 3)] {
+            let photo = photo.picture();
+            let params = TileParams { patch: PATCH, quality: Quality::Draft, ..normal(26, 24) };
+            let tile = made(&photo, 0, &params);
+            let bound = tile.report.costs.texture.expect("copied");
+            let exact = exact(&photo, &tile.picture);
+            assert!(exact <= bound * 1.000_001, "{exact} is above its bound {bound}");
+            assert!(bound < 2.0 * exact, "{bound} is no useful bound of {exact}");
+        }
+    }
+
+    #[test]
+    fn a_crop_costs_nothing_and_a_shuffle_more_than_any_tile() {
+        let photo = grain(40, 44, 1).picture();
+        let wrap = Wrap { y: false, x: false };
+        let cost = |place: &dyn Fn(u32) -> [u32; 2]| {
+            let map = SourceMap::new((24, 26), (40, 44), (0..24 * 26).map(place).collect());
+            let map = map.expect("map");
+            let tile = map.apply(&photo, MapKind::Color).expect("gather");
+            cost_bound(&tile, &photo, &map, PATCH, wrap)
+        };
+        assert_eq!(cost(&|i| [i / 26 + 7, i % 26 + 3]), 0.0, "a crop");
+        let shuffled = cost(&|i| [i * 17 % 40, i * 29 % 44]);
+        let tile = made(&photo, 0, &TileParams { patch: PATCH, ..normal(26, 24) });
+        let tiled = tile.report.costs.texture.expect("copied");
+        assert!(shuffled > 3.0 * tiled, "shuffled {shuffled}, tiled {tiled}");
+    }
+}

@@ -186,23 +186,18 @@ mod copied {
     fn masked_and_transparent_pixels_are_never_used() {
         let (h, w) = (72_usize, 80_usize);
         let exemplar = stained(h, w, 5);
-        // What must not be used is bright red: a violation is also visible.
         let hole = |y: usize, x: usize| (y % 36 < 9 && x % 40 < 10) || (y > 60 && x > 50);
         let thin = |y: usize, x: usize| x == 37 || y == 20;
         let mask = Mask::new(h, w, (0..h * w).map(|i| !hole(i / w, i % w)).collect());
         let mask = mask.expect("mask");
         let rgba = (0..h * w).flat_map(|i| {
             let [r, g, b] = exemplar.rgb[i].map(|v| (v * 255.0) as u8);
-            match (thin(i / w, i % w), hole(i / w, i % w)) {
-                // Half transparent.
-                (true, _) => [255, 0, 0, 128],
-                (_, true) => [255, 0, 0, 255],
-                _ => [r, g, b, 255],
-            }
+            // What must not be used looks like the rest: only the rule keeps it out.
+            [r, g, b, if thin(i / w, i % w) { 128 } else { 255 }]
         });
         let photo = exemplar.with(4, Samples::U8(rgba.collect()), Encoding::Srgb);
         for method in COPYING {
-            for patch in [3, 11] {
+            for patch in [3, 7] {
                 for axis in [Axis::Both, Axis::X] {
                     let params = TileParams { method, axis, patch, ..draft(64, 50) };
                     let tile = made(&photo, Some(&mask), &params);
