@@ -135,7 +135,10 @@ impl Quantiles {
 /// The nearest soft code.
 #[inline]
 pub fn rounded(v: f32) -> u16 {
-    (v + 0.5).clamp(0.0, SOFT_MAX as f32) as u16
+    // At 2^23 the last bit of a float is worth one: adding it rounds, and leaves the whole number
+    // in the low bits. (A cast would check for NaN and overflow, which cannot be here.)
+    const TO_WHOLE: f32 = (1 << 23) as f32;
+    ((v.max(0.0) + TO_WHOLE).to_bits() & 0xffff).min(SOFT_MAX as u32) as u16
 }
 
 #[cfg(test)]
@@ -169,6 +172,12 @@ mod tests {
         let half = wanted.matching_table(&own, 0.5);
         assert!(table[2500].abs_diff(5000) < 64, "{}", table[2500]);
         assert!(half[2500].abs_diff(3750) < 64, "{}", half[2500]);
+    }
+
+    #[test]
+    fn rounding_is_to_the_nearest_inside_the_range() {
+        let given = [-70.0, 0.0, 0.4, 0.6, 63.2, 8127.7, 8128.4, 9000.0];
+        assert_eq!(given.map(rounded), [0, 0, 0, 1, 63, 8128, 8128, 8128]);
     }
 
     #[test]

@@ -195,20 +195,13 @@ impl LocalDistributions {
     }
 
     /// The share of the window around (`y`, `x`) that lies below `v`.
-    #[inline]
     pub fn share_below(&self, y: usize, x: usize, v: u16) -> f32 {
-        self.interpolated(&self.cdf, y, x, v)
-    }
-
-    /// Value at (`y`, `x`, `v`) of a table laid out as the shares are.
-    #[inline]
-    fn interpolated(&self, table: &[f32], y: usize, x: usize, v: u16) -> f32 {
         let (bin, at) = bin_of(v);
         let (y0, y1, fy) = self.rows.place[y];
         let (x0, x1, fx) = self.cols.place[x];
         let cell = |y: usize, x: usize| {
             let i = (y * self.cols.n + x) * (BINS + 1) + bin;
-            table[i] + (table[i + 1] - table[i]) * at
+            self.cdf[i] + (self.cdf[i + 1] - self.cdf[i]) * at
         };
         let top = cell(y0, x0) + (cell(y0, x1) - cell(y0, x0)) * fx;
         let bottom = cell(y1, x0) + (cell(y1, x1) - cell(y1, x0)) * fx;
@@ -269,11 +262,26 @@ pub fn project(pixels: &mut [Soft], domain: Domain, sigma: f64) {
         let local = LocalDistributions::new(pixels, None, k, domain, sigma);
         let quantiles = local.global().expect("some pixels").quantiles();
         let mapped: Vec<f32> = local.cdf.par_iter().map(|&share| quantiles.at(share)).collect();
-        pixels.par_chunks_mut(domain.width).enumerate().for_each(|(y, row)| {
-            for (x, px) in row.iter_mut().enumerate() {
-                px[k] = rounded(local.interpolated(&mapped, y, x, px[k]));
-            }
-        });
+        let row_len = local.cols.n * (BINS + 1);
+        pixels.par_chunks_mut(domain.width).enumerate().for_each_init(
+            || vec![0f32; row_len],
+            |tables, (y, row)| {
+                // The mappings of the two cell rows, blended once for the whole pixel row.
+                let (y0, y1, fy) = local.rows.place[y];
+                let (upper, lower) = (&mapped[y0 * row_len..], &mapped[y1 * row_len..]);
+                for ((t, &a), &b) in tables.iter_mut().zip(upper).zip(lower) {
+                    *t = a + (b - a) * fy;
+                }
+                for (px, &(x0, x1, fx)) in row.iter_mut().zip(&local.cols.place) {
+                    let (bin, at) = bin_of(px[k]);
+                    let value = |cell: usize| {
+                        let i = cell * (BINS + 1) + bin;
+                        tables[i] + (tables[i + 1] - tables[i]) * at
+                    };
+                    px[k] = rounded(value(x0) + (value(x1) - value(x0)) * fx);
+                }
+            },
+        );
     }
 }
 

@@ -17,8 +17,10 @@ use crate::signal::resample::{resized, resized_mask};
 /// Ratio of the sides of two neighbouring levels (the paper's).
 const RATIO: f64 = 1.3;
 
-/// Shorter side of the coarsest level, at least (the paper's).
-const COARSEST: f64 = 48.0;
+/// Shorter side of the coarsest level, at most, in pixels. The paper starts at 64 or a quarter of the
+/// output; from less, a patch spans a fifth of the output and larger features stay whole. From 32,
+/// a few large features fill the tile.
+const COARSEST: usize = 48;
 
 /// Window of the exemplar's typical histogram, as a fraction of its shorter side. Smaller than the
 /// texture's own features, it would call their colours untypical; larger than the stains' distances,
@@ -27,7 +29,7 @@ const TYPICAL_WINDOW: f64 = 0.1;
 
 /// Cost of using a patch as often as the average, as a share of the patch's own variance. More
 /// drives neighbouring pixels to different places of the photo, and the vote blurs.
-const USAGE_SHARE: f64 = 0.006;
+const USAGE_SHARE: f64 = 0.012;
 
 /// Affine map from L*a*b* to 7-bit codes, the same scale for all channels, so that distances of
 /// codes are Euclidean distances of colours.
@@ -105,14 +107,17 @@ pub(super) fn build(photo: &Picture, mask: Option<&Mask>, plan: &Plan) -> Result
     let mut pixels = model.averaging_pixels(photo);
     let mut usable = mask.map(|m| m.usable().to_vec());
     let n_usable = mask.map_or(eh * ew, Mask::count);
-    let coarsest = COARSEST;
-    let n_levels = ((h.min(w) as f64 / coarsest).ln() / RATIO.ln()).ceil().max(0.0) as usize + 1;
     let mut codes = None;
     let mut levels = Vec::new();
-    for j in 0..n_levels {
-        let at = |n: usize| (n as f64 / RATIO.powi(j as i32)).round() as usize;
+    for j in 0.. {
+        let at = |n: usize| (n as f64 / RATIO.powi(j)).round() as usize;
         if j > 0 {
             let to = (at(photo.height()), at(photo.width()));
+            // The side before this one was still above the coarsest: go one below it.
+            let above = (h.min(w) as f64 / RATIO.powi(j - 1)).round() as usize;
+            if above <= COARSEST {
+                break;
+            }
             if to.0 < 2 * plan.patch || to.1 < 2 * plan.patch || at(h.min(w)) < plan.patch {
                 break;
             }

@@ -75,6 +75,7 @@ pub fn run(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, plan: &Plan) -> Resu
             Some(coarse) => coarse.upsampled(h, w, &level.source, ctx.seed),
         };
         let coarsest = j == n_coarse;
+        let mut usage = Usage::of(&f, &level.source, plan.uniformity * level.usage_unit);
         let (iterations, search) = effort(plan, level, coarsest);
         for i in 0..iterations {
             let mut votes = vote(ctx.simd, &f, &level.source, plan.wrap);
@@ -87,7 +88,8 @@ pub fn run(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, plan: &Plan) -> Resu
                 localhist::project(&mut votes.soft, domain, sigma);
             }
             let target = canvas(&votes, plan, (h, w));
-            let usage = Usage::of(&f, &level.source, plan.uniformity * level.usage_unit);
+            let now = Usage::of(&f, &level.source, plan.uniformity * level.usage_unit);
+            usage = now.averaged(&usage);
             let search = Search { pass, ..search };
             patchmatch::pass(ctx, &target, &level.source, &usage, plan.wrap, search, &mut f)?;
             pass += 1;
@@ -124,11 +126,13 @@ pub fn memory_bytes(photo: (usize, usize), output: (usize, usize)) -> u64 {
 
 /// Picks what to do at a level: iterations, and how far to search.
 fn effort(plan: &Plan, level: &Level, coarsest: bool) -> (u32, Search) {
-    let _ = level;
-    if coarsest {
+    let finest = level.size == plan.size;
+    if finest && !coarsest {
+        (plan.fine_iterations.div_ceil(2), Search { pass: 0, radius: 32, n_random: 2 })
+    } else if coarsest {
         (plan.coarse_iterations, Search { pass: 0, radius: 0, n_random: 8 })
     } else {
-        (plan.fine_iterations, Search { pass: 0, radius: 64, n_random: 4 })
+        (plan.fine_iterations, Search { pass: 0, radius: 32, n_random: 2 })
     }
 }
 
