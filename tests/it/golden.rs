@@ -155,6 +155,9 @@ fn stripes_on_one_axis() {
     check("stripes_x.png", &stripes(128, 128, 24), &params);
 }
 
+/// A new sample from all of them, row, column and channel.
+type Change<'a> = dyn Fn(&[u8], usize, usize, usize) -> u8 + 'a;
+
 /// The comparison forgives what nobody sees and nothing else.
 #[test]
 fn the_comparison_is_neither_blind_nor_fussy() {
@@ -163,7 +166,7 @@ fn the_comparison_is_neither_blind_nor_fussy() {
         let (color, contrast) = difference(&golden, other);
         color <= COLOR_TOLERANCE && contrast <= CONTRAST_TOLERANCE
     };
-    let changed = |sample: &dyn Fn(&[u8], usize, usize, usize) -> u8| {
+    let changed = |sample: &Change<'_>| {
         let pixels = pixels(&golden);
         let v = (0..96 * 96 * 3).map(|i| sample(&pixels.samples, i / 288, i / 3 % 96, i % 3));
         picture(&Pixels { samples: v.collect(), ..pixels })

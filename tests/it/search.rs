@@ -239,8 +239,7 @@ mod fields {
 
     fn passes(
         ctx: &Ctx,
-        target: &MatchImage,
-        source: &Source,
+        (target, source): (&MatchImage, &Source),
         usage: &Usage,
         wrap: Wrap,
         n_random: u32,
@@ -290,7 +289,7 @@ mod fields {
         let first = mean(&before);
         for pass in 0..8 {
             let one = pass..pass + 1;
-            passes(&ctx, &target, &source, &usage, NONE, 6, one, &mut field);
+            passes(&ctx, (&target, &source), &usage, NONE, 6, one, &mut field);
             let after = measured(&field);
             let worse = before.iter().zip(&after).filter(|(b, a)| a > b).count();
             assert_eq!(worse, 0, "matches made worse by pass {pass}");
@@ -323,7 +322,7 @@ mod fields {
         let ctx = ctx();
         let mut field = random_field(h, w, &source, 3);
         let usage = Usage::free(&source);
-        passes(&ctx, &target, &source, &usage, NONE, 8, 0..6, &mut field);
+        passes(&ctx, (&target, &source), &usage, NONE, 8, 0..6, &mut field);
         let (mut whole, mut found) = (0, 0);
         for y in 0..h {
             for x in 0..w {
@@ -362,7 +361,7 @@ mod fields {
             let mut field = random_field(24, 24, &source, 1);
             all_usable(&field, "random");
             let usage = Usage::of(&field, &source, 100.0);
-            passes(&ctx(), &target, &source, &usage, wrap, 8, 0..6, &mut field);
+            passes(&ctx(), (&target, &source), &usage, wrap, 8, 0..6, &mut field);
             all_usable(&field, "searched");
             all_usable(&field.upsampled(31, 31, &source, 1), "upsampled");
         }
@@ -398,7 +397,7 @@ mod fields {
             for wrap in WRAPS {
                 let mut field = Field { height: h, width: w, pos: Vec::clone(&pos) };
                 let usage = Usage::free(&source);
-                passes(&ctx(), &target, &source, &usage, wrap, 0, 0..1, &mut field);
+                passes(&ctx(), (&target, &source), &usage, wrap, 0, 0..1, &mut field);
                 // Inside the first piece, clear of the other axis' seam.
                 let found = (0..h * w)
                     .filter(|&i| {
@@ -424,7 +423,7 @@ mod fields {
         for (weight, stays) in [(0.0, true), (1000.0, false)] {
             let mut field = crowded();
             let usage = Usage::of(&field, &source, weight);
-            passes(&ctx(), &target, &source, &usage, NONE, 8, 0..1, &mut field);
+            passes(&ctx(), (&target, &source), &usage, NONE, 8, 0..1, &mut field);
             let near =
                 field.pos.iter().filter(|p| p.y().abs_diff(20) < 8 && p.x().abs_diff(20) < 8);
             let near = near.count();
@@ -458,7 +457,7 @@ mod fields {
             ctx.simd = simd;
             let mut field = random_field(70, 60, &source, 3);
             let usage = Usage::of(&field, &source, 3000.0);
-            passes(&ctx, &target, &source, &usage, BOTH, 4, 0..5, &mut field);
+            passes(&ctx, (&target, &source), &usage, BOTH, 4, 0..5, &mut field);
             field.pos
         };
         let want = run(1, Simd::Scalar);
@@ -544,7 +543,7 @@ mod settling {
             [(y + i / w % 7) % sh, (x + i % w % 5) % sw]
         };
         let usable = |&[y, x]: &[usize; 2]| usable[y * sw + x];
-        let find = |i: usize| (0..).map(|t| place(i, t)).find(usable).expect("usable");
+        let find = |i: usize| (0..10_000).map(|t| place(i, t)).find(usable).expect("usable");
         (0..h * w).map(find).map(|[y, x]| [y as u32, x as u32]).collect()
     }
 
