@@ -63,6 +63,7 @@ impl Field {
 
     /// The field of the next finer level: each position keeps its offset, scaled, so that regions
     /// that were copied in one piece stay in one piece.
+    #[must_use]
     pub fn upsampled(&self, height: usize, width: usize, source: &Source, seed: u64) -> Self {
         const STAGE: u32 = 2;
         let half = (source.patch / 2) as isize;

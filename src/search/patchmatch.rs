@@ -109,7 +109,7 @@ impl Usage {
     #[must_use]
     pub fn averaged(mut self, earlier: &Self) -> Self {
         for (cost, &before) in self.cost.iter_mut().zip(&earlier.cost) {
-            *cost = (*cost + before) / 2;
+            *cost = cost.midpoint(before);
         }
         self
     }

@@ -37,9 +37,9 @@ pub struct Canvas<'a> {
 ///
 /// # Errors
 /// [`Error::Cancelled`](crate::Error::Cancelled).
-pub fn settle(ctx: &Ctx, canvas: &Canvas<'_>, from: &mut Vec<From>, sweeps: u32) -> Result<()> {
+pub fn settle(ctx: &Ctx, canvas: &Canvas<'_>, from: &mut [From], sweeps: u32) -> Result<()> {
     let (h, w) = (canvas.target.height(), canvas.target.width());
-    let mut next = from.clone();
+    let mut next = from.to_vec();
     for sweep in 0..2 * sweeps {
         next.par_chunks_mut(w).enumerate().try_for_each(|(y, row)| {
             let line = |d: isize| neighbor(y, d, h, canvas.wrap.y).map(|y| &from[y * w..][..w]);

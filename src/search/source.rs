@@ -101,6 +101,8 @@ impl Source {
 
 /// Sum over the `n` x `n` box at each position of the values that `fill` writes row by row.
 fn box_sums(h: usize, w: usize, n: usize, fill: impl Fn(usize, &mut [i32]) + Sync) -> Vec<i32> {
+    // Rows that share running sums: long bands, so that the sums restart rarely.
+    const BAND: usize = 64;
     let (rows, cols) = (h - n + 1, w - n + 1);
     let mut horizontal = vec![0i32; h * cols];
     horizontal.par_chunks_mut(cols).enumerate().for_each_init(
@@ -116,8 +118,6 @@ fn box_sums(h: usize, w: usize, n: usize, fill: impl Fn(usize, &mut [i32]) + Syn
         },
     );
     let mut out = vec![0i32; rows * cols];
-    // Bands, so that each thread's running sums restart rarely.
-    const BAND: usize = 64;
     out.par_chunks_mut(BAND * cols).enumerate().for_each(|(band, out)| {
         let y0 = band * BAND;
         let mut sum = vec![0i32; cols];
@@ -128,11 +128,9 @@ fn box_sums(h: usize, w: usize, n: usize, fill: impl Fn(usize, &mut [i32]) + Syn
             let y = y0 + i;
             let enter = &horizontal[(y + n - 1) * cols..(y + n) * cols];
             let leave = &horizontal[y * cols..(y + 1) * cols];
-            for x in 0..cols {
-                sum[x] += enter[x];
-                out[x] = sum[x];
-                sum[x] -= leave[x];
-            }
+            sum.iter_mut().zip(enter).for_each(|(s, v)| *s += v);
+            out.copy_from_slice(&sum);
+            sum.iter_mut().zip(leave).for_each(|(s, v)| *s -= v);
         }
     });
     out

@@ -66,6 +66,24 @@ impl Distribution {
         Self::from_masses(&masses.iter().map(|&m| m as f64).collect::<Vec<_>>())
     }
 
+    /// The distribution of channel `k`; `None` of no pixels. Counts are integers: any order of
+    /// work gives the same.
+    pub fn of_channel(pixels: &[Soft], k: usize) -> Option<Self> {
+        use rayon::prelude::*;
+        const CHUNK: usize = 1 << 16;
+        let count = |chunk: &[Soft]| {
+            let mut masses = [0u64; BINS];
+            chunk.iter().for_each(|px| masses[bin_of(px[k]).0] += 1);
+            masses
+        };
+        let sum = |mut a: [u64; BINS], b: [u64; BINS]| {
+            a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
+            a
+        };
+        let masses = pixels.par_chunks(CHUNK).map(count).reduce(|| [0; BINS], sum);
+        Self::from_masses(&masses.map(|m| m as f64))
+    }
+
     /// The share of values below `v`.
     #[inline]
     pub fn share_below(&self, v: u16) -> f32 {

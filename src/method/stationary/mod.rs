@@ -144,7 +144,7 @@ fn match_global(votes: &mut Votes, level: &Level, alpha: f32) {
         if alpha <= 0.0 {
             continue;
         }
-        let own = Distribution::of(votes.soft.iter().map(|px| px[k])).expect("some pixels");
+        let own = Distribution::of_channel(&votes.soft, k).expect("some pixels");
         let table = level.quantiles[k].matching_table(&own, alpha);
         votes.soft.par_iter_mut().for_each(|px| px[k] = table[px[k] as usize]);
     }
