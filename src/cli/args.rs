@@ -97,7 +97,8 @@ fn tile() -> Command {
         .args(TileParams::schema().into_iter().map(flag))
         .next_help_heading("Inputs")
         .arg(
-            file("mask", "FILE", "Picture of the photo's size: white where the photo may be used")
+            file("mask", "FILE", "Picture of the photo's size: usable is where its first channel is at least half of \
+                 full scale and its alpha, if any, too; the photo's own transparent pixels are never used")
                 .long("mask"),
         )
         .arg(

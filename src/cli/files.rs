@@ -6,11 +6,10 @@ use crate::base::error::{Error, Result};
 use crate::image::io::{self, Format, WriteOptions};
 use crate::image::material::{self, MapKind, MapName};
 use crate::image::picture::{Picture, Sample, Samples};
-use crate::image::sourcemap::SourceMap;
 use crate::with_samples;
 
 pub(super) use crate::image::io::{
-    check_output as check_place, read, read_record, read_source_map,
+    check_output as check_place, encode_source_map, read, read_record, read_source_map,
 };
 pub(super) use crate::image::material::siblings;
 
@@ -60,17 +59,6 @@ pub(super) fn ensure_can_hold(picture: &Picture, path: Option<&Path>, kind: MapK
 /// [`Sample::wrap`] where the type is known by its vector only.
 fn wrap<T: Sample>(v: Vec<T>) -> Samples {
     T::wrap(v)
-}
-
-/// The bytes of a source map's file.
-///
-/// # Errors
-/// [`Error::Format`], [`Error::Io`].
-pub(super) fn encode_source_map(map: &SourceMap, path: &Path) -> Result<Vec<u8>> {
-    let folder = tempfile::tempdir().map_err(Error::io("write", path))?;
-    let file = folder.path().join("source_map.exr");
-    io::write_source_map(&file, map, false)?;
-    std::fs::read(&file).map_err(Error::io("read", file))
 }
 
 /// The map that goes by this name or alias, in any spelling (`normal`, `Normal-GL`).

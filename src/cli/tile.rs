@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::ArgMatches;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
@@ -65,8 +65,18 @@ struct Summary {
 
 #[derive(Debug, Serialize)]
 struct Seconds {
-    stages: BTreeMap<&'static str, f64>,
+    /// In the order of the work.
+    #[serde(serialize_with = "in_order")]
+    stages: Vec<(&'static str, f64)>,
     total: f64,
+}
+
+/// Pairs as one JSON object that keeps their order.
+fn in_order<S: Serializer>(
+    pairs: &[(&'static str, f64)],
+    to: S,
+) -> std::result::Result<S::Ok, S::Error> {
+    to.collect_map(pairs.iter().copied())
 }
 
 /// Runs `texforge tile`.
@@ -353,10 +363,6 @@ fn summary(
 ) -> Summary {
     let place = request.target.file().unwrap_or(Path::new("-"));
     let (photo, tile) = (report.photo_size, report.tile_size);
-    let mut stages = BTreeMap::new();
-    for (stage, seconds) in &report.seconds {
-        *stages.entry(*stage).or_default() += seconds;
-    }
     Summary {
         schema_version: SCHEMA_VERSION,
         verb: TileParams::VERB,
@@ -367,7 +373,7 @@ fn summary(
         photo: Written::new("photo", None, &request.photo, photo.0, photo.1),
         tile: Written::new("tile", None, place, tile.0, tile.1),
         costs: report.costs,
-        seconds: Seconds { stages, total: elapsed.as_secs_f64() },
+        seconds: Seconds { stages: report.seconds.clone(), total: elapsed.as_secs_f64() },
         files,
         notes,
     }

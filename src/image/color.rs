@@ -67,9 +67,15 @@ impl MatchSpace {
         match self {
             Self::Lab => {
                 let table = &LAB_CURVE[..];
-                row.iter_mut().for_each(|px| *px = lab_from_linear(table, *px));
+                for px in row {
+                    *px = lab_from_linear(table, *px);
+                }
             }
-            Self::Data => row.as_flattened_mut().iter_mut().for_each(|v| *v *= 100.0),
+            Self::Data => {
+                for v in row.as_flattened_mut() {
+                    *v *= 100.0;
+                }
+            }
         }
     }
 }
@@ -213,7 +219,9 @@ impl Components {
                 let norm = next.iter().map(|v| v * v).sum::<f64>().sqrt();
                 // What is left of no variance is rounding; it has no direction.
                 let scale = if norm > 1e-9 * total { 1.0 / norm } else { 0.0 };
-                next.iter_mut().for_each(|v| *v *= scale);
+                for v in &mut next {
+                    *v *= scale;
+                }
                 axis = next;
             }
             axes.push(axis);

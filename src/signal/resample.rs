@@ -21,7 +21,9 @@ fn tent_taps(from: usize, to: usize) -> Vec<Taps> {
                 .map(|j| (1.0 - (j as f64 - center).abs() / reach).max(0.0))
                 .collect();
             let sum: f64 = weights.iter().sum();
-            weights.iter_mut().for_each(|w| *w /= sum);
+            for w in &mut weights {
+                *w /= sum;
+            }
             Taps { first, weights: weights.into_iter().map(|w| w as f32).collect() }
         })
         .collect()

@@ -60,6 +60,17 @@ mod success {
     }
 
     #[test]
+    fn json_keeps_the_stages_in_order() {
+        let folder = Folder::with_photo();
+        let output = folder.run(quick(&["--json"]));
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        let place = |stage: &str| text.find(&format!("\"{stage}\": ")).expect(stage);
+        let stages = text.find("\"stages\"").expect("stages");
+        let costs = text[stages..].find("\"costs\": ").expect("costs") + stages;
+        assert!(stages < place("synthesis") && place("synthesis") < costs, "{text}");
+    }
+
+    #[test]
     fn quiet_says_nothing() {
         let folder = Folder::with_photo();
         assert_eq!(folder.does(&quick(&["-q"])), "");

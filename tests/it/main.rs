@@ -1,7 +1,11 @@
 //! The one integration test binary; a module per subject.
 
 mod cli;
+mod golden;
 mod house;
 mod io;
+mod quality;
+mod search;
 #[path = "../support/mod.rs"]
 mod support;
+mod tile;

@@ -1,5 +1,7 @@
 //! Small pictures made by code, folders that notice what is written into them, runs of the program.
 
+pub(crate) mod exemplar;
+
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
 use std::io::Cursor;
@@ -151,16 +153,25 @@ impl Pixels {
     }
 
     fn save(&self, path: &Path) {
-        let file = std::fs::File::create(path).expect("file");
-        let mut encoder = png::Encoder::new(file, self.width as u32, self.height as u32);
+        std::fs::write(path, self.encode()).expect("file");
+    }
+
+    /// The bytes of a PNG, as small as it gets.
+    pub(crate) fn encode(&self) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, self.width as u32, self.height as u32);
         encoder.set_color(if self.channels == 3 {
             png::ColorType::Rgb
         } else {
             png::ColorType::Grayscale
         });
         encoder.set_depth(if self.deep { png::BitDepth::Sixteen } else { png::BitDepth::Eight });
+        encoder.set_compression(png::Compression::High);
+        encoder.set_filter(png::Filter::Adaptive);
         let mut writer = encoder.write_header().expect("header");
         writer.write_image_data(&self.samples).expect("pixels");
+        writer.finish().expect("end");
+        bytes
     }
 }
 

@@ -27,7 +27,7 @@ use crate::image::picture::{Encoding, Meta, Picture, Samples};
 
 pub use place::check_output;
 pub use record::read_record;
-pub use source_map::{read_source_map, write_source_map};
+pub use source_map::{encode_source_map, read_source_map, write_source_map};
 pub use write::{WriteOptions, encode, write};
 
 /// A file format.

@@ -25,12 +25,20 @@ struct Header {
     height: usize,
 }
 
-/// Writes a source map as EXR: two 32-bit integer channels `source.x` and `source.y`, and an
-/// attribute `texforge` with the layout's version and the size of the source.
+/// Writes the bytes of [`encode_source_map`].
 ///
 /// # Errors
-/// [`Error::Format`] (another extension than `.exr`), [`Error::Exists`], [`Error::Io`].
+/// Those of [`encode_source_map`], [`Error::Exists`], [`Error::Io`].
 pub fn write_source_map(path: &Path, map: &SourceMap, force: bool) -> Result<()> {
+    put(path, &encode_source_map(map, path)?, force)
+}
+
+/// A source map as the bytes of an EXR file: two 32-bit integer channels `source.x` and
+/// `source.y`, and an attribute `texforge` with the layout's version and the size of the source.
+///
+/// # Errors
+/// [`Error::Format`] if `path`, where the bytes are to go, does not end in `.exr`.
+pub fn encode_source_map(map: &SourceMap, path: &Path) -> Result<Vec<u8>> {
     if Format::from_extension(path) != Some(Format::Exr) {
         return Err(Error::Format {
             path: path.to_owned(),
@@ -43,9 +51,8 @@ pub fn write_source_map(path: &Path, map: &SourceMap, force: bool) -> Result<()>
     let header = serde_json::to_string(&header).map_err(|e| internal(e.to_string()))?;
     let plane = |k: usize| FlatSamples::U32(map.positions().iter().map(|p| p[k]).collect());
     let channels = vec![("source.x".to_owned(), plane(1)), ("source.y".to_owned(), plane(0))];
-    let bytes = planes::encode_planes((map.width(), map.height()), channels, None, Some(&header))
-        .map_err(internal)?;
-    put(path, &bytes, force)
+    planes::encode_planes((map.width(), map.height()), channels, None, Some(&header))
+        .map_err(internal)
 }
 
 /// Reads what [`write_source_map`] wrote.
