@@ -8,10 +8,11 @@ VENV := .venv
 BIN := $(VENV)/bin
 WHEELS := target/wheels
 PHOTO ?=
+BENCH ?=
 EXEMPLARS ?= ../shared/exemplars
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-rust test-python lint format gallery bench wheel ci clean
+.PHONY: help setup demo test test-rust test-python lint format gallery bench bench-peers bench-record wheel ci clean
 
 help: ## List the targets.
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -68,7 +69,14 @@ gallery: setup ## Tile every exemplar and write contact sheets, in gallery/.
 	$(BIN)/python docs/gallery.py "$(EXEMPLARS)"
 
 bench: ## Measure the kernels.
-	$(CARGO) bench --locked
+	$(CARGO) bench --locked --bench kernels
+
+bench-peers: $(BIN)/.ready ## Compare with G'MIC and texture-synthesis (PHOTO=file, BENCH="--large ...").
+	$(BIN)/python benches/peers.py $(if $(PHOTO),"$(PHOTO)") $(BENCH)
+
+bench-record: $(BIN)/.ready ## Measure all and keep it in benches/record/.
+	TEXFORGE_BENCH_TABLE=$(CURDIR)/target/kernels.md $(CARGO) bench --locked --bench kernels
+	$(BIN)/python benches/peers.py $(if $(PHOTO),"$(PHOTO)") $(BENCH) --kernels target/kernels.md --record $(shell date +%F)
 
 wheel: $(BIN)/.ready ## Build the wheel for distribution, in dist/.
 	$(BIN)/maturin build --release --out dist
