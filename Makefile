@@ -10,12 +10,13 @@ WHEELS := target/wheels
 PHOTO ?=
 BENCH ?=
 EXEMPLARS ?= ../shared/exemplars
+GALLERY ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-rust test-python lint format gallery bench bench-peers bench-record wheel ci clean
+.PHONY: help setup demo test test-rust test-python lint format gallery readme-pictures bench bench-peers bench-record wheel ci clean
 
 help: ## List the targets.
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-15s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 # The virtual environment with everything but texforge itself.
 $(BIN)/.ready: pyproject.toml
@@ -65,8 +66,11 @@ format: $(BIN)/.ready ## Format everything.
 	$(BIN)/ruff format
 	$(BIN)/ruff check --fix
 
-gallery: setup ## Tile every exemplar and write contact sheets, in gallery/.
-	$(BIN)/python docs/gallery.py "$(EXEMPLARS)"
+gallery: setup ## Tile every exemplar and write contact sheets, in gallery/ (GALLERY='--class stains').
+	$(BIN)/python docs/gallery.py "$(EXEMPLARS)" $(GALLERY)
+
+readme-pictures: setup ## Make the README's pictures anew, in docs/pictures/.
+	$(BIN)/python docs/readme_pictures.py
 
 bench: ## Measure the kernels.
 	$(CARGO) bench --locked --bench kernels

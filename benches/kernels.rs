@@ -28,7 +28,7 @@ use texforge::search::patchmatch::{Search, Usage, Wrap, distances, pass};
 use texforge::search::seams::{self, Canvas};
 use texforge::search::source::Source;
 use texforge::search::vote::vote;
-use texforge::signal::histogram::Bins;
+use texforge::signal::histogram::{SOFT_BITS, SOFT_MAX, Soft};
 use texforge::signal::localhist::{Domain, LocalDistributions, project};
 use texforge::{Ctx, Simd};
 
@@ -256,17 +256,20 @@ fn votes(bench: &mut Bench, ctx: &Ctx) {
         let votes = run();
         for i in samples(SIDE * SIDE, 200) {
             let (y, x) = (i / SIDE, i % SIDE);
-            let mut sum = [0u16; 4];
+            let mut sum = [0u32; 4];
             for dy in 0..N {
                 for dx in 0..N {
                     // The patch whose pixel (dy, dx) lies here has its middle at:
                     let (cy, cx) = ((y + SIDE + N / 2 - dy) % SIDE, (x + SIDE + N / 2 - dx) % SIDE);
                     let from = scene.field.pos[cy * SIDE + cx];
                     let px = scene.source.image.pixel(from.y() + dy, from.x() + dx);
-                    sum.iter_mut().zip(px).for_each(|(s, p)| *s += p as u16);
+                    sum.iter_mut().zip(px).for_each(|(s, p)| *s += u32::from(p));
                 }
             }
-            assert_eq!(votes.sums[i], sum, "{name}: at {y}, {x}");
+            let mean = sum.map(|s| f64::from(s) * f64::from(1u32 << SOFT_BITS) / (N * N) as f64);
+            let near =
+                votes.soft[i].iter().zip(mean).all(|(&s, m)| (f64::from(s) - m).abs() <= 1.0);
+            assert!(near, "{name}: {:?}, not {mean:?} at {y}, {x}", votes.soft[i]);
         }
         group.bench_function(name, |b| b.iter(run));
     }
@@ -276,19 +279,18 @@ fn projection(bench: &mut Bench) {
     let domain = Domain { height: SIDE, width: SIDE, wrap_y: true, wrap_x: true };
     let sigma = 0.1 * SIDE as f64;
     let image = pebbles(SIDE, SIDE, 3);
-    let pixels: Vec<[f32; 4]> = (0..SIDE * SIDE)
+    let pixels: Vec<Soft> = (0..SIDE * SIDE)
         .map(|i| {
             let (y, x) = (i / SIDE, i % SIDE);
             // A stain, as in a photo.
             let stain = if (y as f32 - 200.0).hypot(x as f32 - 300.0) < 80.0 { -20.0 } else { 0.0 };
             let [a, b, c, _] = image.pixel(y, x).map(f32::from);
-            [a + stain, b, c, (a - b).abs()]
+            let soft = |v: f32| (v * (1 << SOFT_BITS) as f32).clamp(0.0, SOFT_MAX as f32) as u16;
+            [a + stain, b, c, (a - b).abs()].map(soft)
         })
         .collect();
-    let uneven = |pixels: &[[f32; 4]]| {
-        let bins = Bins::covering(pixels.iter().map(|px| px[0]), 64);
-        LocalDistributions::new(pixels, None, 0, domain, sigma, bins).mean_distance()
-    };
+    let uneven =
+        |pixels: &[Soft]| LocalDistributions::new(pixels, None, 0, domain, sigma).mean_distance();
     let mut even = pixels.clone();
     project(&mut even, domain, sigma);
     let (before, after) = (uneven(&pixels), uneven(&even));

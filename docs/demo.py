@@ -25,7 +25,7 @@ def main(arguments: list[str]) -> int:
             name = "gravel (scikit-image)"
             gravel = skimage.data.gravel()  # type: ignore[no-untyped-call]
             photo = texforge.Image.tagged(gravel, "srgb")
-            tile = texforge.tile(photo, size=256, progress=sys.stderr.isatty())
+            tile = texforge.tile(photo, size=384, progress=sys.stderr.isatty())
         seconds = time.perf_counter() - started
         OUT.mkdir(exist_ok=True)
         suffix = ".exr" if tile.encoding == "linear" else ".png"

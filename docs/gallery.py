@@ -1,74 +1,229 @@
-"""Tiles every picture below a folder and writes one contact sheet a folder: `make gallery`."""
+"""Tiles every picture below a folder; one contact sheet a class, one page for all: `make gallery`.
+
+The classes are the folders in the folder. A row of a sheet shows the photo, the baseline
+`wrap-only` and the stationary tile repeated 3 x 3 (all at the same scale), and the middle of the
+tile at full size, shifted by half so that the corner where four copies meet is in the middle.
+"""
 
 from __future__ import annotations
 
 import argparse
+import dataclasses
+import html
+import re
 import sys
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import contact
+import numpy as np
 import texforge
+from PIL import Image
 
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+METHODS: tuple[texforge.Method, ...] = ("wrap-only", "stationary")
 SUFFIXES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".exr"}
-OTHER_MAPS = ("normal", "nor_", "rough", "height", "disp", "_ao", "occlusion", "metal")
+OTHER_MAPS = re.compile(
+    r"(^|[-_. ])(ao|arm|orm|disp|displacement|height|metal|metallic|nor|normal|normalgl|normaldx"
+    r"|nrm|occlusion|opacity|rough|roughness)([-_. ]|$)"
+)
+"""Words in the names of files that are no base colours."""
+SHRINK = 4
+"""Photos whose shorter side is longer than this many tiles are made smaller first."""
 
 
-def row(path: Path, out: Path, arguments: argparse.Namespace) -> list[contact.Cell]:
-    """Tile one photograph; return its row of the sheet."""
-    photo = texforge.read_image(path)
-    side = min(arguments.size, *photo.shape[:2])
-    cells = [
-        (
-            f"{path.name} {photo.shape[1]}x{photo.shape[0]}",
-            contact.fitted(contact.shown(photo, photo.encoding), 512),
-        )
+@dataclasses.dataclass
+class Page:
+    """What the page shows of one class."""
+
+    name: str
+    sheet: str = ""
+    rows: list[tuple[str, ...]] = dataclasses.field(default_factory=list)
+    failures: list[str] = dataclasses.field(default_factory=list)
+
+
+def reduced(photo: texforge.Image, side: int) -> texforge.Image:
+    """Return the photo, averaged over squares of pixels if it is much larger than the tile."""
+    factor = min(photo.shape[:2]) // (SHRINK * side)
+    if factor < 2:
+        return photo
+    array = np.asarray(photo)
+    height, width = (n // factor for n in array.shape[:2])
+    blocks = array[: height * factor, : width * factor].reshape(
+        height, factor, width, factor, *array.shape[2:]
+    )
+    mean = blocks.mean(axis=(1, 3), dtype=np.float64)
+    if array.dtype.kind in "ui":
+        mean = np.rint(mean)
+    return texforge.Image.tagged(mean.astype(array.dtype), photo.encoding)
+
+
+def lightness(picture: Image.Image) -> npt.NDArray[np.float64]:
+    """Return CIE L* of a picture as shown."""
+    srgb = np.asarray(picture, dtype=np.float64) / 255
+    linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+    y = linear @ np.array([0.2126, 0.7152, 0.0722])
+    star: npt.NDArray[np.float64] = np.where(y > 216 / 24389, 116 * np.cbrt(y) - 16, y * 24389 / 27)
+    return star
+
+
+def gradient(picture: Image.Image, used: npt.NDArray[np.bool_]) -> float:
+    """Return the mean absolute difference of L* between neighbouring pixels that are used."""
+    plane = lightness(picture)
+    differences = [
+        np.abs(np.diff(plane, axis=axis))[
+            np.take(used, range(1, used.shape[axis]), axis)
+            & np.take(used, range(used.shape[axis] - 1), axis)
+        ]
+        for axis in (0, 1)
     ]
-    for method in arguments.methods:
+    both = np.concatenate(differences)
+    return float(both.mean()) if both.size else 0.0
+
+
+def opaque(image: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
+    """Return where a picture is wholly opaque."""
+    if image.ndim == 3 and image.shape[2] in (2, 4):
+        full = 1.0 if image.dtype.kind == "f" else np.iinfo(image.dtype).max
+        return np.asarray(image[:, :, -1] >= full)
+    return np.ones(image.shape[:2], dtype=bool)
+
+
+def middle(picture: Image.Image, width: int, height: int) -> Image.Image:
+    """Return at most this much of the picture's middle."""
+    left, top = (max(0, a - b) // 2 for a, b in zip(picture.size, (width, height), strict=True))
+    right, bottom = (min(a, b) for a, b in zip(picture.size, (width, height), strict=True))
+    return picture.crop((left, top, left + right, top + bottom))
+
+
+def scaled(picture: Image.Image, scale: float) -> Image.Image:
+    """Return the picture at this scale."""
+    width, height = (max(1, round(n * scale)) for n in picture.size)
+    return picture.resize((width, height), Image.Resampling.LANCZOS)
+
+
+def row(path: Path, out: Path, seed: int, side: int, page: Page) -> list[contact.Cell]:
+    """Tile one photograph in every way; return its row of the sheet."""
+    whole = texforge.read_image(path)
+    photo = reduced(whole, side)
+    side = min(side, *photo.shape[:2])
+    scale = min(1.0, 0.5 * 384 / side)
+    seen = contact.shown(photo, photo.encoding)
+    sharp = gradient(seen, opaque(photo))
+    height, width = photo.shape[:2]
+    label = f"{path.name} {width} x {height}"
+    if photo is not whole:
+        label += f" (1/{whole.shape[1] // width})"
+    limit = round(3 * side * scale)
+    shown = scaled(seen, scale)
+    if max(shown.size) > limit:
+        label += ", its middle"
+        shown = middle(shown, limit, limit)
+    cells: list[contact.Cell] = [(label, shown)]
+    for method in METHODS:
         started = time.perf_counter()
-        tile = texforge.tile(photo, size=side, method=method, seed=arguments.seed)
+        tile = texforge.tile(photo, size=side, method=method, seed=seed)
         seconds = time.perf_counter() - started
-        label = f"{method}: {tile.costs}, {seconds:.1f} s"
-        print(f"{path}: {label}", flush=True)
-        picture = contact.shown(tile.tiled(3, 3), tile.encoding)
-        contact.shown(tile.image, tile.encoding).save(out / f"{path.stem}_{method}.png")
-        cells.append((label, contact.fitted(picture, 640)))
+        once = contact.shown(tile.image, tile.encoding)
+        ratio = gradient(once, opaque(tile.image)) / sharp if sharp else 1.0
+        texture = tile.costs.texture or 0.0
+        caption = (
+            f"{method}, seed {seed}: texture {texture:.2f}, stationarity "
+            f"{tile.costs.stationarity:.2f}, sharpness {ratio:.2f}, {seconds:.1f} s"
+        )
+        print(f"{path}: {caption}", flush=True)
+        once.save(out / f"{path.stem}_{method}_{seed}.png")
+        cells.append((caption, scaled(contact.shown(tile.tiled(3, 3), tile.encoding), scale)))
+        page.rows.append(
+            (
+                path.name,
+                method,
+                str(seed),
+                f"{texture:.2f}",
+                f"{tile.costs.stationarity:.2f}",
+                f"{ratio:.2f}",
+                f"{seconds:.1f}",
+            )
+        )
+        if method == METHODS[-1]:
+            turned = np.roll(np.asarray(once), (once.height // 2, once.width // 2), (0, 1))
+            corner = middle(Image.fromarray(turned), 384, 384)
+            cells.append(("the same, the corner where copies meet, 1:1", corner))
     return cells
 
 
-def main() -> int:
-    """Write the sheets; return 1 if a picture failed."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path, help="pictures, or folders of them")
-    parser.add_argument("--out", type=Path, default=Path("gallery"))
-    parser.add_argument("--size", type=int, default=384, help="largest side of a tile")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--only", default="", help="part of the path that must match")
-    parser.add_argument(
-        "--methods", nargs="+", default=["stationary", "wrap-only"], help="columns of the sheet"
+def write_index(out: Path, pages: list[Page]) -> None:
+    """Write the page that shows all sheets and numbers."""
+    head = ["photo", "method", "seed", "texture", "stationarity", "sharpness", "seconds"]
+    parts = ["<!doctype html><meta charset=utf-8><title>texforge gallery</title>"]
+    parts.append(
+        "<style>body{font:14px sans-serif;margin:2em}img{max-width:100%}"
+        "td,th{text-align:left;padding:0 1em 0 0}</style><h1>Gallery</h1>"
+        "<p>Sharpness is the mean absolute difference of L* between neighbouring pixels, of the "
+        "tile over that of the photo. Costs: lower is better.</p>"
     )
+    for page in pages:
+        parts.append(f"<h2>{html.escape(page.name)}</h2>")
+        if page.sheet:
+            sheet = html.escape(page.sheet)
+            parts.append(f'<a href="{sheet}"><img src="{sheet}" alt="contact sheet"></a>')
+        parts.extend(f"<p>Failed: {html.escape(failure)}</p>" for failure in page.failures)
+        rows = [head, *page.rows]
+        cells = ("".join(f"<td>{html.escape(cell)}</td>" for cell in line) for line in rows)
+        parts.append("<table>" + "".join(f"<tr>{line}</tr>" for line in cells) + "</table>")
+    (out / "index.html").write_text("\n".join(parts) + "\n", encoding="utf-8")
+
+
+def main() -> int:
+    """Write the sheets and the page; return 1 if a picture failed."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path, help="folder of folders of pictures")
+    parser.add_argument("--out", type=Path, default=Path("gallery"))
+    parser.add_argument("--class", dest="classes", nargs="+", default=[], help="only these")
+    parser.add_argument("--only", default="", help="part of the path that must match")
+    parser.add_argument("--size", type=int, default=384, help="side of a tile, at most")
+    parser.add_argument("--seeds", type=int, nargs="+", default=[0])
     arguments = parser.parse_args()
-    folders: dict[Path, list[Path]] = {}
-    for path in sorted(arguments.folder.rglob("*")):
+    folder: Path = arguments.folder
+    if not folder.is_dir():
+        print(f"gallery: skipped, there is no folder {folder}")
+        return 0
+    classes: dict[str, list[Path]] = {}
+    for path in sorted(folder.rglob("*")):
+        parts = path.relative_to(folder).parts
+        name = parts[0] if len(parts) > 1 else folder.name
         wanted = path.suffix.lower() in SUFFIXES and arguments.only in str(path)
-        if wanted and not any(word in path.name.lower() for word in OTHER_MAPS):
-            folders.setdefault(path.parent, []).append(path)
-    n_failed = 0
-    for folder, paths in folders.items():
-        name = "_".join(folder.relative_to(arguments.folder).parts) or folder.name
+        if arguments.classes and name not in arguments.classes:
+            continue
+        if wanted and not OTHER_MAPS.search(path.stem.lower()):
+            classes.setdefault(name, []).append(path)
+    pages = []
+    for name, paths in classes.items():
+        page = Page(name)
         out = arguments.out / name
         out.mkdir(parents=True, exist_ok=True)
         rows = []
         for path in paths:
-            try:
-                rows.append(row(path, out, arguments))
-            except texforge.TexforgeError as error:
-                n_failed += 1
-                print(f"{path}: {error}", file=sys.stderr)
+            for seed in arguments.seeds:
+                try:
+                    rows.append(row(path, out, seed, arguments.size, page))
+                except (texforge.TexforgeError, ValueError, OSError) as error:
+                    page.failures.append(f"{path.name}, seed {seed}: {error}")
+                    print(f"{path}: failed: {error}", file=sys.stderr, flush=True)
         if rows:
-            contact.sheet(rows).save(arguments.out / f"{name}.png")
-            print(f"wrote {arguments.out / name}.png", flush=True)
-    return 1 if n_failed else 0
+            page.sheet = f"{name}.png"
+            contact.sheet(rows).save(arguments.out / page.sheet)
+            print(f"wrote {arguments.out / page.sheet}", flush=True)
+        pages.append(page)
+        write_index(arguments.out, pages)
+    if not pages:
+        print(f"gallery: nothing to do, no picture in {folder} matches")
+        return 0
+    print(f"wrote {arguments.out / 'index.html'}")
+    return 1 if any(page.failures for page in pages) else 0
 
 
 if __name__ == "__main__":

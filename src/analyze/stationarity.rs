@@ -1,23 +1,31 @@
 //! Stationarity cost: how different the places of a texture are from each other.
 
-use crate::signal::histogram::Bins;
-use crate::signal::localhist::{Domain, LocalDistributions, Pixel};
+use crate::signal::histogram::{SOFT_MAX, Soft, rounded};
+use crate::signal::localhist::{Domain, LocalDistributions};
 
 /// Mean earth mover's distance between the local histograms of two places of the picture, over
-/// all pairs of places, summed over the three channels (L*a*b* units); 0 for a picture that is the
-/// same everywhere. `sigma` is the window's standard deviation in pixels.
+/// all pairs of places, summed over the three channels (in the pixels' units); 0 for a picture
+/// that is the same everywhere. `sigma` is the window's standard deviation in pixels.
 ///
 /// # Paper
-/// Moritz et al. 2017, eq. 1 with the histogram measure of eq. 3.
+/// Moritz et al. 2017, eq. 1 with the histogram measure of eq. 3, of 128 bins over each channel's
+/// range.
 ///
 /// # Determinism
 /// Same bytes for any thread count.
-pub fn histogram_cost(pixels: &[Pixel], domain: Domain, sigma: f64) -> f64 {
-    const BINS: usize = 128;
+pub fn histogram_cost(pixels: &[[f32; 3]], domain: Domain, sigma: f64) -> f64 {
     (0..3)
         .map(|k| {
-            let bins = Bins::covering(pixels.iter().map(|px| px[k]), BINS);
-            LocalDistributions::new(pixels, None, k, domain, sigma, bins).mean_distance()
+            let ends = (f32::MAX, f32::MIN);
+            let (low, high) = pixels.iter().fold(ends, |(l, h), px| (l.min(px[k]), h.max(px[k])));
+            if low >= high {
+                return 0.0;
+            }
+            let scale = SOFT_MAX as f32 / (high - low);
+            let soft: Vec<Soft> =
+                pixels.iter().map(|px| [rounded((px[k] - low) * scale), 0, 0, 0]).collect();
+            let codes = LocalDistributions::new(&soft, None, 0, domain, sigma).mean_distance();
+            codes * f64::from(high - low) / 127.0
         })
         .sum()
 }
@@ -30,7 +38,7 @@ mod tests {
     fn a_stain_costs_and_noise_does_not() {
         let domain = Domain { height: 64, width: 64, wrap_y: true, wrap_x: true };
         let noise = |i: usize| ((i * 7919) % 97) as f32 / 4.0;
-        let even: Vec<Pixel> = (0..4096).map(|i| [50.0 + noise(i), 0.0, 0.0, 0.0]).collect();
+        let even: Vec<[f32; 3]> = (0..4096).map(|i| [50.0 + noise(i), 0.0, 0.0]).collect();
         let mut stained = even.clone();
         for (i, px) in stained.iter_mut().enumerate() {
             if (i / 64) < 24 && (i % 64) < 24 {

@@ -81,6 +81,8 @@ pub struct ColorModel {
     space: MatchSpace,
     encoding: Encoding,
     components: Option<Components>,
+    /// Linear value of every integer sample; empty for floats.
+    table: Vec<f32>,
 }
 
 impl ColorModel {
@@ -89,11 +91,20 @@ impl ColorModel {
         let encoding = photo.encoding;
         let is_color = encoding != Encoding::Data && photo.channels() <= 4;
         let many = !is_color && photo.channels() > 3;
-        Self {
+        let n_values = match photo.samples() {
+            Samples::U8(_) => 256,
+            Samples::U16(_) => 65536,
+            _ => 0,
+        };
+        let mut model = Self {
             space: if is_color { MatchSpace::Lab } else { MatchSpace::Data },
             encoding,
             components: many.then(|| Components::of(photo)),
-        }
+            table: Vec::new(),
+        };
+        let value = |i: usize| model.linear(i as f64 / (n_values - 1) as f64) as f32;
+        model.table = (0..n_values).map(value).collect();
+        model
     }
 
     /// How averages become colours to match.
@@ -106,8 +117,8 @@ impl ColorModel {
     pub fn averaging_pixels(&self, picture: &Picture) -> Vec<[f32; 3]> {
         let c = picture.channels();
         match picture.samples() {
-            Samples::U8(v) => self.by_table(v, c, &self.table(256)),
-            Samples::U16(v) => self.by_table(v, c, &self.table(65536)),
+            Samples::U8(v) => v.par_chunks_exact(c).map(|px| self.by_table(px)).collect(),
+            Samples::U16(v) => v.par_chunks_exact(c).map(|px| self.by_table(px)).collect(),
             samples => with_samples!(samples, v => v
                 .par_chunks_exact(c)
                 .map(|px| self.averaging(c, |k| px[k].to_unit()))
@@ -118,7 +129,11 @@ impl ColorModel {
     /// The colour to match of pixel `i`.
     pub fn matching_pixel(&self, picture: &Picture, i: usize) -> [f32; 3] {
         let c = picture.channels();
-        let mut px = [self.averaging(c, |k| picture.samples().unit(i * c + k))];
+        let mut px = [match picture.samples() {
+            Samples::U8(v) => self.by_table(&v[i * c..(i + 1) * c]),
+            Samples::U16(v) => self.by_table(&v[i * c..(i + 1) * c]),
+            samples => self.averaging(c, |k| samples.unit(i * c + k)),
+        }];
         self.space.convert_row(&mut px);
         px[0]
     }
@@ -146,22 +161,12 @@ impl ColorModel {
         })
     }
 
-    /// The linear value of every integer sample.
-    fn table(&self, n: usize) -> Vec<f32> {
-        (0..n).map(|i| self.linear(i as f64 / (n - 1) as f64) as f32).collect()
-    }
-
-    fn by_table<T: Sample + Into<usize>>(&self, v: &[T], c: usize, table: &[f32]) -> Vec<[f32; 3]> {
+    #[inline]
+    fn by_table<T: Sample + Into<usize>>(&self, px: &[T]) -> [f32; 3] {
         if self.components.is_some() {
-            return v
-                .par_chunks_exact(c)
-                .map(|px| self.averaging(c, |k| px[k].to_unit()))
-                .collect();
+            return self.averaging(px.len(), |k| px[k].to_unit());
         }
-        let channels: [Option<usize>; 3] = std::array::from_fn(|k| self.channel(c, k));
-        v.par_chunks_exact(c)
-            .map(|px| channels.map(|k| k.map_or(0.0, |k| table[px[k].into()])))
-            .collect()
+        std::array::from_fn(|k| self.channel(px.len(), k).map_or(0.0, |k| self.table[px[k].into()]))
     }
 }
 

@@ -104,6 +104,16 @@ impl Usage {
         usage
     }
 
+    /// The mean of this cost and an earlier one for the same source. Costs that jump from pass to
+    /// pass drive all pixels from one place to the next together; averaged, they settle.
+    #[must_use]
+    pub fn averaged(mut self, earlier: &Self) -> Self {
+        for (cost, &before) in self.cost.iter_mut().zip(&earlier.cost) {
+            *cost = (*cost + before) / 2;
+        }
+        self
+    }
+
     #[inline]
     fn cost(&self, pos: Pos) -> i32 {
         self.cost[(pos.y() >> self.shift) * self.cols + (pos.x() >> self.shift)]

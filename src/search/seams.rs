@@ -42,8 +42,22 @@ pub fn settle(ctx: &Ctx, canvas: &Canvas<'_>, from: &mut Vec<From>, sweeps: u32)
     let mut next = from.clone();
     for sweep in 0..2 * sweeps {
         next.par_chunks_mut(w).enumerate().try_for_each(|(y, row)| {
+            let line = |d: isize| neighbor(y, d, h, canvas.wrap.y).map(|y| &from[y * w..][..w]);
+            let (above, own, below) = (line(-1), &from[y * w..][..w], line(1));
+            let inside = |x: usize| {
+                let [sy, sx] = own[x];
+                let is = |line: Option<&[From]>, dy: u32| {
+                    line.is_none_or(|line| line[x] == [sy.wrapping_add(dy), sx])
+                };
+                (x > 0 && own[x - 1] == [sy, sx.wrapping_sub(1)])
+                    && (x + 1 < w && own[x + 1] == [sy, sx + 1])
+                    && is(above, u32::MAX)
+                    && is(below, 1)
+            };
             for x in ((y + sweep as usize) % 2..w).step_by(2) {
-                row[x] = canvas.best(from, h, w, y, x);
+                if !inside(x) {
+                    row[x] = canvas.best(from, h, w, y, x);
+                }
             }
             ctx.step(0)
         })?;
@@ -71,13 +85,13 @@ impl Canvas<'_> {
         if !border {
             return own;
         }
-        let mut best = (self.energy(own, &pieces, &STEPS, y, x), own);
+        let mut best = (self.energy(own, &pieces, &STEPS, (y, x), i32::MAX), own);
         for (i, (dy, dx)) in STEPS.into_iter().enumerate() {
             let Some(candidate) = pieces[i].and_then(|p| shifted(p, -dy, -dx)) else { continue };
             if candidate == best.1 || !self.may_use(candidate) {
                 continue;
             }
-            let energy = self.energy(candidate, &pieces, &STEPS, y, x);
+            let energy = self.energy(candidate, &pieces, &STEPS, (y, x), best.0);
             if energy < best.0 {
                 best = (energy, candidate);
             }
@@ -98,13 +112,16 @@ impl Canvas<'_> {
         here: From,
         pieces: &[Option<From>; 4],
         steps: &[(isize, isize); 4],
-        y: usize,
-        x: usize,
+        (y, x): (usize, usize),
+        enough: i32,
     ) -> i32 {
         let color = |[y, x]: From| self.source.pixel(y as usize, x as usize);
         let own = color(here);
         let mut energy = difference(own, self.target.pixel(y, x));
         for (piece, &(dy, dx)) in pieces.iter().zip(steps) {
+            if energy >= enough {
+                return energy;
+            }
             let Some(there) = *piece else { continue };
             let continued = shifted(here, dy, dx);
             if continued == Some(there) {

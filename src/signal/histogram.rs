@@ -1,113 +1,101 @@
-//! Histograms of one channel, their distribution functions and quantiles.
+//! Distributions of code values: histograms, cumulative shares, quantiles.
+//!
+//! Values are *soft codes*: codes of the matching space (`0..=127`) with six bits of fraction, so
+//! that means of codes lose nothing that matters and everything below is integer in, integer out.
 
-/// Equal bins over a closed interval.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bins {
-    /// Lower end of the first bin.
-    pub low: f32,
-    /// Width of a bin.
-    pub width: f32,
-    /// Number of bins.
-    pub n: usize,
+/// Soft codes of one pixel: three colour channels and local contrast.
+pub type Soft = [u16; 4];
+
+/// Bits of fraction in a soft code.
+pub const SOFT_BITS: u32 = 6;
+
+/// Largest soft code.
+pub const SOFT_MAX: u16 = 127 << SOFT_BITS;
+
+/// Bins of a histogram: one per code.
+pub const BINS: usize = 128;
+
+/// The bin of a soft code and where in it the value lies, in `0..1`.
+#[inline]
+pub fn bin_of(v: u16) -> (usize, f32) {
+    const WIDTH: f32 = (1 << SOFT_BITS) as f32;
+    // The bin of code c holds the values that round to it.
+    let v = v + (1 << (SOFT_BITS - 1));
+    ((v >> SOFT_BITS) as usize, (v & ((1 << SOFT_BITS) - 1)) as f32 / WIDTH)
 }
 
-impl Bins {
-    /// `n` bins from the least to the largest of the values; one value gives bins of width 1.
-    pub fn covering(values: impl Iterator<Item = f32>, n: usize) -> Self {
-        let (low, high) =
-            values.fold((f32::MAX, f32::MIN), |(low, high), v| (low.min(v), high.max(v)));
-        if low > high {
-            return Self { low: 0.0, width: 1.0, n };
-        }
-        let width = (high - low) / n as f32;
-        Self { low, width: if width > 0.0 { width } else { 1.0 }, n }
-    }
-
-    /// The bin of `v` (the ends for values outside) and where in it `v` lies, in `0..=1`.
-    #[inline]
-    pub fn place(&self, v: f32) -> (usize, f32) {
-        let at = ((v - self.low) / self.width).clamp(0.0, self.n as f32);
-        let bin = (at as usize).min(self.n - 1);
-        (bin, at - bin as f32)
-    }
+/// Value at the lower edge of a bin, in soft codes (-32 for the first).
+#[inline]
+fn edge(bin: f32) -> f32 {
+    const WIDTH: f32 = (1 << SOFT_BITS) as f32;
+    (bin - 0.5) * WIDTH
 }
 
-/// A cumulative distribution: `n + 1` values from 0 to 1 at the bins' edges, linear between.
+/// A cumulative distribution: `BINS + 1` shares from 0 to 1 at the bins' edges, linear between.
 #[derive(Debug, Clone)]
 pub struct Distribution {
-    bins: Bins,
     cdf: Vec<f32>,
 }
 
 impl Distribution {
-    /// The distribution of bin masses (any positive total).
-    pub fn from_masses(bins: Bins, masses: &[f64]) -> Self {
-        assert_eq!(masses.len(), bins.n, "one mass a bin");
+    /// The distribution of bin masses; `None` if there is no mass.
+    pub fn from_masses(masses: &[f64]) -> Option<Self> {
+        assert_eq!(masses.len(), BINS, "one mass a bin");
         let total: f64 = masses.iter().sum();
-        let scale = if total > 0.0 { 1.0 / total } else { 0.0 };
-        let mut sum = 0.0;
-        let mut cdf = vec![0.0];
-        for mass in masses {
-            sum += mass;
-            cdf.push((sum * scale) as f32);
-        }
         if total <= 0.0 {
-            cdf[bins.n] = 1.0;
+            return None;
         }
-        Self { bins, cdf }
+        let mut sum = 0.0;
+        let shares = masses.iter().map(|mass| {
+            sum += mass;
+            (sum / total) as f32
+        });
+        Some(Self { cdf: std::iter::once(0.0).chain(shares).collect() })
     }
 
     /// The distribution with these shares below the bins' edges.
-    pub fn from_cumulative(bins: Bins, cdf: Vec<f32>) -> Self {
-        assert_eq!(cdf.len(), bins.n + 1, "one share an edge");
-        Self { bins, cdf }
+    pub fn from_cumulative(cdf: Vec<f32>) -> Self {
+        assert_eq!(cdf.len(), BINS + 1, "one share an edge");
+        Self { cdf }
     }
 
-    /// The distribution of these values.
-    pub fn of(values: impl Iterator<Item = f32>, bins: Bins) -> Self {
-        let mut masses = vec![0u64; bins.n];
-        values.for_each(|v| masses[bins.place(v).0] += 1);
-        let masses: Vec<f64> = masses.iter().map(|&m| m as f64).collect();
-        Self::from_masses(bins, &masses)
+    /// The distribution of these soft codes; `None` of none.
+    pub fn of(values: impl Iterator<Item = u16>) -> Option<Self> {
+        let mut masses = vec![0u64; BINS];
+        values.for_each(|v| masses[bin_of(v).0] += 1);
+        Self::from_masses(&masses.iter().map(|&m| m as f64).collect::<Vec<_>>())
     }
 
     /// The share of values below `v`.
     #[inline]
-    pub fn share_below(&self, v: f32) -> f32 {
-        let (bin, at) = self.bins.place(v);
+    pub fn share_below(&self, v: u16) -> f32 {
+        let (bin, at) = bin_of(v);
         self.cdf[bin] + (self.cdf[bin + 1] - self.cdf[bin]) * at
     }
 
     /// The inverse, tabulated for speed.
     pub fn quantiles(&self) -> Quantiles {
-        const STEPS: usize = 1024;
         let mut bin = 0;
-        let table = (0..=STEPS)
+        let table = (0..=QUANTILES)
             .map(|i| {
-                let u = i as f32 / STEPS as f32;
-                while bin + 1 < self.bins.n && self.cdf[bin + 1] < u {
+                let u = i as f32 / QUANTILES as f32;
+                // Empty bins hold no values; the least value is where the mass begins.
+                while bin + 1 < BINS && (self.cdf[bin + 1] < u || self.cdf[bin + 1] <= 0.0) {
                     bin += 1;
                 }
-                // Empty bins at the start hold no values: their end is the least value.
-                if i == 0 {
-                    while bin + 1 < self.bins.n && self.cdf[bin + 1] <= 0.0 {
-                        bin += 1;
-                    }
-                }
                 let (below, above) = (self.cdf[bin], self.cdf[bin + 1]);
-                let at = if above > below {
-                    ((u - below) / (above - below)).clamp(0.0, 1.0)
-                } else {
-                    0.0
-                };
-                self.bins.low + (bin as f32 + at) * self.bins.width
+                let at = if above > below { (u - below) / (above - below) } else { 0.0 };
+                edge(bin as f32 + at.clamp(0.0, 1.0))
             })
             .collect();
         Quantiles { table }
     }
 }
 
-/// A tabulated quantile function.
+/// Steps of a tabulated quantile function.
+const QUANTILES: usize = 1024;
+
+/// A tabulated quantile function, in soft codes.
 #[derive(Debug, Clone)]
 pub struct Quantiles {
     table: Vec<f32>,
@@ -115,26 +103,42 @@ pub struct Quantiles {
 
 impl Quantiles {
     /// The median of each quantile over several distributions.
-    pub fn median(all: &[Self]) -> Self {
-        assert!(!all.is_empty(), "a median of nothing");
-        let table = (0..all[0].table.len())
-            .map(|i| {
-                let mut values: Vec<f32> = all.iter().map(|q| q.table[i]).collect();
-                let middle = values.len() / 2;
-                *values.select_nth_unstable_by(middle, f32::total_cmp).1
-            })
-            .collect();
-        Self { table }
+    pub fn median(all: &[Self]) -> Option<Self> {
+        let middle = all.len() / 2;
+        let median = |i| {
+            let mut values: Vec<f32> = all.iter().map(|q| q.table[i]).collect();
+            *values.select_nth_unstable_by(middle, f32::total_cmp).1
+        };
+        (!all.is_empty()).then(|| Self { table: (0..=QUANTILES).map(median).collect() })
     }
 
     /// The value below which the share `u` in `0..=1` lies.
     #[inline]
     pub fn at(&self, u: f32) -> f32 {
-        let last = self.table.len() - 1;
-        let at = u.clamp(0.0, 1.0) * last as f32;
-        let i = (at as usize).min(last - 1);
+        let at = u.clamp(0.0, 1.0) * QUANTILES as f32;
+        let i = (at as usize).min(QUANTILES - 1);
         self.table[i] + (self.table[i + 1] - self.table[i]) * (at - i as f32)
     }
+
+    /// For every soft code v of something distributed as `own`: the value `(1 - alpha) v + alpha
+    /// Q(F_own(v))`, `Q` being these quantiles.
+    pub fn matching_table(&self, own: &Distribution, alpha: f32) -> Vec<u16> {
+        (0..=SOFT_MAX)
+            .map(|v| {
+                let wanted = self.at(own.share_below(v));
+                rounded(v as f32 + alpha * (wanted - v as f32))
+            })
+            .collect()
+    }
+}
+
+/// The nearest soft code.
+#[inline]
+pub fn rounded(v: f32) -> u16 {
+    // At 2^23 the last bit of a float is worth one: adding it rounds, and leaves the whole number
+    // in the low bits. (A cast would check for NaN and overflow, which cannot be here.)
+    const TO_WHOLE: f32 = (1 << 23) as f32;
+    ((v.max(0.0) + TO_WHOLE).to_bits() & 0xffff).min(SOFT_MAX as u32) as u16
 }
 
 #[cfg(test)]
@@ -143,22 +147,42 @@ mod tests {
 
     #[test]
     fn quantiles_invert_the_distribution() {
-        let values: Vec<f32> = (0..5000).map(|i| ((i * 7919) % 5000) as f32 / 50.0).collect();
-        let skewed: Vec<f32> = values.iter().map(|v| v * v / 100.0).collect();
-        let bins = Bins::covering(skewed.iter().copied(), 256);
-        let distribution = Distribution::of(skewed.iter().copied(), bins);
+        let skewed = || (0..5000u32).map(|i| ((i * 7919) % 5000).pow(2) / 3100).map(|v| v as u16);
+        let distribution = Distribution::of(skewed()).expect("some");
         let quantiles = distribution.quantiles();
-        for v in skewed {
+        for v in skewed() {
             let back = quantiles.at(distribution.share_below(v));
-            assert!((back - v).abs() < 2.0 * bins.width, "{v} came back as {back}");
+            assert!((back - v as f32).abs() < 64.0, "{v} came back as {back}");
         }
     }
 
     #[test]
-    fn a_constant_stays_itself() {
-        let bins = Bins::covering([3.5; 10].into_iter(), 64);
-        let distribution = Distribution::of([3.5; 10].into_iter(), bins);
-        let back = distribution.quantiles().at(distribution.share_below(3.5));
-        assert!((back - 3.5).abs() < 1e-6, "came back as {back}");
+    fn a_distribution_matched_to_itself_moves_by_less_than_a_code() {
+        let values = || (0..3000u16).map(|i| 1000 + (i * 7) % 4000);
+        let own = Distribution::of(values()).expect("some");
+        let table = own.quantiles().matching_table(&own, 1.0);
+        assert!(values().all(|v| table[v as usize].abs_diff(v) < 64), "moved");
+    }
+
+    #[test]
+    fn matching_shifts_a_shifted_distribution() {
+        let own = Distribution::of((0..1000).map(|i| 2000 + i)).expect("some");
+        let wanted = Distribution::of((0..1000).map(|i| 4000 + 2 * i)).expect("some").quantiles();
+        let table = wanted.matching_table(&own, 1.0);
+        let half = wanted.matching_table(&own, 0.5);
+        assert!(table[2500].abs_diff(5000) < 64, "{}", table[2500]);
+        assert!(half[2500].abs_diff(3750) < 64, "{}", half[2500]);
+    }
+
+    #[test]
+    fn rounding_is_to_the_nearest_inside_the_range() {
+        let given = [-70.0, 0.0, 0.4, 0.6, 63.2, 8127.7, 8128.4, 9000.0];
+        assert_eq!(given.map(rounded), [0, 0, 0, 1, 63, 8128, 8128, 8128]);
+    }
+
+    #[test]
+    fn nothing_has_no_distribution_and_no_median() {
+        assert!(Distribution::of(std::iter::empty()).is_none());
+        assert!(Quantiles::median(&[]).is_none());
     }
 }

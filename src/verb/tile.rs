@@ -16,7 +16,7 @@ use crate::image::picture::Picture;
 use crate::image::sourcemap::SourceMap;
 use crate::method::{make_seamless, stationary};
 use crate::search::patchmatch::Wrap;
-use crate::signal::localhist::{Domain, Pixel};
+use crate::signal::localhist::Domain;
 
 /// Longest side of a tile, in pixels.
 const MAX_TILE_SIDE: usize = 32_768;
@@ -335,7 +335,6 @@ fn costs(
     let model = ColorModel::new(photo);
     let mut pixels = model.averaging_pixels(picture);
     model.space().convert_row(&mut pixels);
-    let pixels: Vec<Pixel> = pixels.into_iter().map(|[l, a, b]| [l, a, b, 0.0]).collect();
     let (height, width) = (picture.height(), picture.width());
     let domain = Domain { height, width, wrap_y: wrap.y, wrap_x: wrap.x };
     let sigma = f64::from(params.sigma) * height.min(width) as f64;

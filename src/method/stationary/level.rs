@@ -5,17 +5,22 @@ use crate::image::color::{ColorModel, MatchSpace};
 use crate::image::mask::Mask;
 use crate::image::picture::Picture;
 use crate::method::stationary::{CONTRAST, Plan};
+use rayon::prelude::*;
+
+use crate::search::field::Pos;
 use crate::search::patch::{CODE_MAX, MatchImage};
-use crate::search::source::Source;
-use crate::signal::histogram::{Bins, Distribution, Quantiles};
-use crate::signal::localhist::{Domain, LocalDistributions, Pixel};
+use crate::search::source::{Source, UNUSABLE};
+use crate::signal::histogram::{Distribution, Quantiles, SOFT_BITS, Soft};
+use crate::signal::localhist::{Domain, LocalDistributions};
 use crate::signal::resample::{resized, resized_mask};
 
 /// Ratio of the sides of two neighbouring levels (the paper's).
 const RATIO: f64 = 1.3;
 
-/// Shorter side of the coarsest level, at least (the paper's).
-const COARSEST: f64 = 48.0;
+/// Shorter side of the coarsest level, at most, in pixels. The paper starts at 64 or a quarter of the
+/// output; from less, a patch spans a fifth of the output and larger features stay whole. From 32,
+/// a few large features fill the tile.
+const COARSEST: usize = 48;
 
 /// Window of the exemplar's typical histogram, as a fraction of its shorter side. Smaller than the
 /// texture's own features, it would call their colours untypical; larger than the stains' distances,
@@ -24,54 +29,57 @@ const TYPICAL_WINDOW: f64 = 0.1;
 
 /// Cost of using a patch as often as the average, as a share of the patch's own variance. More
 /// drives neighbouring pixels to different places of the photo, and the vote blurs.
-const USAGE_SHARE: f64 = 0.006;
+const USAGE_SHARE: f64 = 0.012;
 
-/// Affine map between L*a*b* and 7-bit codes, the same scale for all channels, so that distances
-/// of codes are Euclidean distances of colours.
+/// Affine map from L*a*b* to 7-bit codes, the same scale for all channels, so that distances of
+/// codes are Euclidean distances of colours.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Codes {
-    low: Pixel,
+struct Codes {
+    low: [f32; 3],
     /// Codes per unit.
-    pub(super) scale: f32,
+    scale: f32,
 }
 
 impl Codes {
     /// Covers 99.8 % of each channel's usable values.
-    fn covering(pixels: &[Pixel], usable: Option<&[bool]>) -> Self {
-        // A hundred thousand samples fix the ends well enough.
-        let step = (pixels.len() / 100_000).max(1);
-        let mut low = [0.0; 4];
-        let mut range = 0f32;
-        for k in 0..3 {
-            let mut values: Vec<f32> = (0..pixels.len())
-                .step_by(step)
-                .filter(|&i| usable.is_none_or(|u| u[i]))
-                .map(|i| pixels[i][k])
+    fn covering(pixels: &[[f32; 3]], space: MatchSpace, usable: Option<&[bool]>) -> Self {
+        // Twenty thousand samples fix the ends well enough.
+        let step = (pixels.len() / 20_000).max(1);
+        let mut sample: Vec<[f32; 3]> = (0..pixels.len())
+            .step_by(step)
+            .filter(|&i| usable.is_none_or(|u| u[i]))
+            .map(|i| pixels[i])
+            .collect();
+        if sample.is_empty() {
+            // A few usable pixels between the samples: take them all.
+            sample = pixels
+                .iter()
+                .zip(usable.unwrap_or_default())
+                .filter(|(_, u)| **u)
+                .map(|(px, _)| *px)
                 .collect();
-            if values.is_empty() {
-                values.push(0.0);
-            }
-            values.sort_unstable_by(f32::total_cmp);
-            let cut = values.len() / 1000;
-            low[k] = values[cut];
-            range = range.max(values[values.len() - 1 - cut] - low[k]);
         }
-        Self { low, scale: CODE_MAX as f32 / range.max(1.0) }
+        space.convert_row(&mut sample);
+        let cut = sample.len() / 1000;
+        let ends = |k: usize| {
+            let mut values: Vec<f32> = sample.iter().map(|px| px[k]).collect();
+            values.sort_unstable_by(f32::total_cmp);
+            match values.len() {
+                0 => (0.0, 0.0),
+                n => (values[cut], values[n - 1 - cut]),
+            }
+        };
+        let ends: [(f32, f32); 3] = std::array::from_fn(ends);
+        let range = ends.iter().map(|(low, high)| high - low).fold(1.0, f32::max);
+        Self { low: ends.map(|(low, _)| low), scale: CODE_MAX as f32 / range }
     }
 
     /// The codes of a colour, rounded; colours outside the range are cut.
     #[inline]
-    pub(super) fn encode(&self, lab: Pixel) -> [u8; 4] {
-        let code = |k: usize| {
+    fn encode(&self, lab: [f32; 3]) -> [u8; 3] {
+        std::array::from_fn(|k| {
             ((lab[k] - self.low[k]) * self.scale + 0.5).clamp(0.0, CODE_MAX as f32) as u8
-        };
-        [code(0), code(1), code(2), code(3)]
-    }
-
-    /// The colour of codes (or means of codes).
-    #[inline]
-    pub(super) fn lab(&self, code: [f32; 4]) -> Pixel {
-        std::array::from_fn(|k| self.low[k] + code[k] / self.scale)
+        })
     }
 }
 
@@ -82,8 +90,6 @@ pub(super) struct Level {
     pub(super) size: (usize, usize),
     /// The exemplar.
     pub(super) source: Source,
-    /// Between colours and codes.
-    pub(super) codes: Codes,
     /// The exemplar's quantiles per channel.
     pub(super) quantiles: [Quantiles; 4],
     /// Uniformity cost of using a patch as often as the average, in squared codes.
@@ -101,14 +107,17 @@ pub(super) fn build(photo: &Picture, mask: Option<&Mask>, plan: &Plan) -> Result
     let mut pixels = model.averaging_pixels(photo);
     let mut usable = mask.map(|m| m.usable().to_vec());
     let n_usable = mask.map_or(eh * ew, Mask::count);
-    let coarsest = COARSEST;
-    let n_levels = ((h.min(w) as f64 / coarsest).ln() / RATIO.ln()).ceil().max(0.0) as usize + 1;
     let mut codes = None;
     let mut levels = Vec::new();
-    for j in 0..n_levels {
-        let at = |n: usize| (n as f64 / RATIO.powi(j as i32)).round() as usize;
+    for j in 0.. {
+        let at = |n: usize| (n as f64 / RATIO.powi(j)).round() as usize;
         if j > 0 {
             let to = (at(photo.height()), at(photo.width()));
+            // The side before this one was still above the coarsest: go one below it.
+            let above = (h.min(w) as f64 / RATIO.powi(j - 1)).round() as usize;
+            if above <= COARSEST {
+                break;
+            }
             if to.0 < 2 * plan.patch || to.1 < 2 * plan.patch || at(h.min(w)) < plan.patch {
                 break;
             }
@@ -123,13 +132,23 @@ pub(super) fn build(photo: &Picture, mask: Option<&Mask>, plan: &Plan) -> Result
             (eh, ew),
             usable.as_deref(),
             size,
-            (plan.patch, plan.sigma.is_some()),
+            plan.patch,
             &mut codes,
         ) {
             Some(level) => levels.push(level),
             // A thin mask leaves no patch at coarse levels: start with finer ones.
             None if j > 0 => break,
             None => return Err(Error::EmptyMask { usable: n_usable, patch: plan.patch }),
+        }
+    }
+    // Only the coarsest level matches colours; without projection it is the paper's plain target.
+    if let (Some(coarsest), true) = (levels.last_mut(), plan.sigma.is_some()) {
+        for (quantiles, typical) in
+            coarsest.quantiles.iter_mut().zip(typical_quantiles(&coarsest.source))
+        {
+            if let Some(typical) = typical {
+                *quantiles = typical;
+            }
         }
     }
     Ok(levels)
@@ -141,81 +160,106 @@ fn level(
     (eh, ew): (usize, usize),
     usable: Option<&[bool]>,
     size: (usize, usize),
-    (patch, typical): (usize, bool),
+    patch: usize,
     codes: &mut Option<Codes>,
 ) -> Option<Level> {
-    use rayon::prelude::*;
-    let mut lab = pixels.to_vec();
-    lab.par_chunks_mut(ew).for_each(|row| space.convert_row(row));
-    let contrast = contrast(&lab, eh, ew);
-    let lab: Vec<Pixel> =
-        lab.par_iter().zip(&contrast).map(|(px, &c)| [px[0], px[1], px[2], c]).collect();
-    let codes = *codes.get_or_insert_with(|| Codes::covering(&lab, usable));
-    let mut image = MatchImage::new(eh, ew);
-    image.fill_rows(|y, row| {
-        row.iter_mut().zip(&lab[y * ew..]).for_each(|(px, &lab)| *px = codes.encode(lab));
+    let codes = *codes.get_or_insert_with(|| Codes::covering(pixels, space, usable));
+    let mut colors = MatchImage::new(eh, ew);
+    colors.fill_rows(|y, row| {
+        let mut lab = pixels[y * ew..][..ew].to_vec();
+        space.convert_row(&mut lab);
+        for (px, lab) in row.iter_mut().zip(lab) {
+            let [l, a, b] = codes.encode(lab);
+            *px = [l, a, b, 0];
+        }
     });
-    let source = Source::new(image, patch, usable)?;
-    let usable_pixels: Vec<usize> =
-        (0..lab.len()).filter(|&i| usable.is_none_or(|u| u[i])).collect();
-    let step = (usable_pixels.len() / 200_000).max(1);
-    let sample: Vec<Pixel> = usable_pixels.iter().step_by(step).map(|&i| lab[i]).collect();
-    let quantiles = std::array::from_fn(|k| {
-        let bins = Bins::covering(sample.iter().map(|px| px[k]), 256);
-        let typical = (typical && k < CONTRAST).then(|| {
-            let domain = Domain { height: eh, width: ew, wrap_y: false, wrap_x: false };
-            let sigma = TYPICAL_WINDOW * eh.min(ew) as f64;
-            LocalDistributions::new(&lab, usable, k, domain, sigma, bins).typical()
-        });
-        typical
-            .flatten()
-            .unwrap_or_else(|| Distribution::of(sample.iter().map(|px| px[k]), bins).quantiles())
+    let source = Source::new(with_contrast(&colors), patch, usable)?;
+    let usable_pixel = |i: &usize| usable.is_none_or(|u| u[*i]);
+    let masses: [Vec<f64>; 4] = std::array::from_fn(|k| {
+        let mut masses = vec![0.0; CODE_MAX as usize + 1];
+        let code = |i: usize| source.image.codes()[4 * i + k] as usize;
+        // An odd step visits every column of a picture of even width.
+        let step = (eh * ew / 400_000) | 1;
+        (0..eh * ew).step_by(step).filter(usable_pixel).for_each(|i| masses[code(i)] += 1.0);
+        masses
     });
-    let variance: f64 = (0..3)
-        .map(|k| {
-            let mean =
-                sample.iter().map(|px| px[k] as f64).sum::<f64>() / sample.len().max(1) as f64;
-            sample.iter().map(|px| (px[k] as f64 - mean).powi(2)).sum::<f64>()
-                / sample.len().max(1) as f64
+    // If the step has missed the few usable pixels, any usable patch's first pixel will do.
+    let distribution = |k: usize| {
+        Distribution::from_masses(&masses[k]).unwrap_or_else(|| {
+            let some = (0..eh * ew).find(usable_pixel).unwrap_or(0);
+            let code = source.image.codes()[4 * some + k];
+            Distribution::of(std::iter::once((code as u16) << SOFT_BITS)).expect("one value")
+        })
+    };
+    let quantiles = std::array::from_fn(|k| distribution(k).quantiles());
+    let variance: f64 = masses[..CONTRAST]
+        .iter()
+        .map(|masses| {
+            let total = masses.iter().sum::<f64>().max(1.0);
+            let moment = |p: i32| {
+                (0..).zip(masses).map(|(c, m)| f64::from(c).powi(p) * m).sum::<f64>() / total
+            };
+            moment(2) - moment(1) * moment(1)
         })
         .sum();
-    let usage_unit =
-        (USAGE_SHARE * variance * (codes.scale * codes.scale) as f64 * (patch * patch) as f64)
-            as f32;
-    Some(Level { size, source, codes, quantiles, usage_unit })
+    let usage_unit = (USAGE_SHARE * variance * (patch * patch) as f64) as f32;
+    Some(Level { size, source, quantiles, usage_unit })
 }
 
-/// Local contrast: standard deviation of the colour over the 5 x 5 pixels around each pixel.
-fn contrast(lab: &[[f32; 3]], h: usize, w: usize) -> Vec<f32> {
-    use rayon::prelude::*;
+/// The exemplar's typical local histogram of each colour: the median over all places of each
+/// quantile. Rare stains are in few windows and drop out of it.
+fn typical_quantiles(source: &Source) -> [Option<Quantiles>; CONTRAST] {
+    let (height, width) = (source.rows(), source.cols());
+    let half = source.patch / 2;
+    // The middles of all patches, and which of the patches are usable.
+    let (soft, usable): (Vec<Soft>, Vec<bool>) = (0..height * width)
+        .into_par_iter()
+        .map(|i| {
+            let (y, x) = (i / width, i % width);
+            let px = source.image.pixel(y + half, x + half);
+            (px.map(|c| u16::from(c) << SOFT_BITS), source.bias(Pos::new(y, x)) != UNUSABLE)
+        })
+        .unzip();
+    let domain = Domain { height, width, wrap_y: false, wrap_x: false };
+    let sigma = TYPICAL_WINDOW * height.min(width) as f64;
+    std::array::from_fn(|k| {
+        LocalDistributions::new(&soft, Some(&usable), k, domain, sigma).typical()
+    })
+}
+
+/// The codes with local contrast as the fourth: the standard deviation of the colour over the 5 x 5
+/// pixels around each pixel, in codes.
+fn with_contrast(colors: &MatchImage) -> MatchImage {
     const REACH: usize = 2;
-    let mut out = vec![0f32; h * w];
-    out.par_chunks_mut(w).enumerate().for_each_init(
-        || vec![[0f32; 6]; w],
-        |columns, (y, out)| {
-            let rows = y.saturating_sub(REACH)..(y + REACH + 1).min(h);
-            let n_rows = rows.len();
-            columns.fill([0.0; 6]);
-            for row in rows {
-                for (sum, px) in columns.iter_mut().zip(&lab[row * w..][..w]) {
-                    for k in 0..3 {
-                        sum[k] += px[k];
-                        sum[3 + k] += px[k] * px[k];
-                    }
-                }
+    let (h, w) = (colors.height(), colors.width());
+    let mut image = MatchImage::new(h, w);
+    image.fill_rows(|y, row| {
+        let rows = y.saturating_sub(REACH)..(y + REACH + 1).min(h);
+        let n_rows = rows.len();
+        // Per column: sums of the three colours, and of all their squares.
+        let mut columns = vec![[0u32; 4]; w];
+        for y in rows {
+            let codes = &colors.codes()[4 * y * w..4 * (y + 1) * w];
+            for (sum, px) in columns.iter_mut().zip(codes.chunks_exact(4)) {
+                let [a, b, c] = [px[0] as u32, px[1] as u32, px[2] as u32];
+                sum[0] += a;
+                sum[1] += b;
+                sum[2] += c;
+                sum[3] += a * a + b * b + c * c;
             }
-            for (x, out) in out.iter_mut().enumerate() {
-                let cols = &columns[x.saturating_sub(REACH)..(x + REACH + 1).min(w)];
-                let n = (n_rows * cols.len()) as f32;
-                let mut variance = 0.0;
-                for k in 0..3 {
-                    let sum: f32 = cols.iter().map(|c| c[k]).sum();
-                    let squares: f32 = cols.iter().map(|c| c[3 + k]).sum();
-                    variance += squares / n - (sum / n) * (sum / n);
-                }
-                *out = variance.max(0.0).sqrt();
+        }
+        let codes = &colors.codes()[4 * y * w..4 * (y + 1) * w];
+        for (x, (out, px)) in row.iter_mut().zip(codes.chunks_exact(4)).enumerate() {
+            let cols = &columns[x.saturating_sub(REACH)..(x + REACH + 1).min(w)];
+            let mut sum = [0u32; 4];
+            for column in cols {
+                (0..4).for_each(|k| sum[k] += column[k]);
             }
-        },
-    );
-    out
+            let n = (n_rows * cols.len()) as f32;
+            let means: f32 = sum[..3].iter().map(|&s| (s as f32 / n) * (s as f32 / n)).sum();
+            let contrast = (sum[3] as f32 / n - means).max(0.0).sqrt();
+            *out = [px[0], px[1], px[2], (contrast + 0.5) as u8];
+        }
+    });
+    image
 }

@@ -5,20 +5,22 @@
 
 mod level;
 
+use rayon::prelude::*;
+
 use crate::base::ctx::Ctx;
 use crate::base::error::Result;
 use crate::image::mask::Mask;
 use crate::image::picture::Picture;
 use crate::image::sourcemap::SourceMap;
-use crate::search::field::Field;
+use crate::search::field::{Field, Pos};
 use crate::search::patch::MatchImage;
 use crate::search::patchmatch::{self, Search, Usage, Wrap};
 use crate::search::seams;
 use crate::search::vote::{Votes, vote};
-use crate::signal::histogram::{Bins, Distribution};
-use crate::signal::localhist::{self, Domain, Pixel};
+use crate::signal::histogram::{Distribution, SOFT_BITS};
+use crate::signal::localhist::{self, Domain};
 
-use level::{Codes, Level};
+use level::Level;
 
 /// Channel that holds local contrast; the three before it are the colour.
 const CONTRAST: usize = 3;
@@ -28,8 +30,8 @@ const CONTRAST: usize = 3;
 /// concrete falls to half the photo's), and at 1 outliers come back.
 const CONTRAST_PULL: f32 = 0.5;
 
-/// Sweeps of the seam placement; after four hardly a pixel moves.
-const SEAM_SWEEPS: u32 = 4;
+/// Sweeps of the seam placement; after three hardly a pixel moves.
+const SEAM_SWEEPS: u32 = 3;
 
 /// What to make, and how hard to try.
 #[derive(Debug, Clone)]
@@ -58,15 +60,12 @@ pub struct Plan {
 pub fn run(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, plan: &Plan) -> Result<SourceMap> {
     let levels = level::build(photo, mask, plan)?;
     let n_coarse = levels.len() - 1;
-    let iterations = |j: usize| {
-        if j == n_coarse { plan.coarse_iterations } else { plan.fine_iterations }
-    };
-    let work: u64 = levels
+    let area = |l: &Level| (l.size.0 * l.size.1) as u64;
+    let work = levels
         .iter()
         .enumerate()
-        .map(|(j, l)| u64::from(iterations(j)) * (l.size.0 * l.size.1) as u64)
-        .sum();
-    ctx.begin(work);
+        .map(|(j, l)| u64::from(effort(plan, l, j == n_coarse).0) * area(l));
+    ctx.begin(work.sum());
     let mut pass = 0;
     let mut field: Option<Field> = None;
     for (j, level) in levels.iter().enumerate().rev() {
@@ -76,21 +75,22 @@ pub fn run(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, plan: &Plan) -> Resu
             Some(coarse) => coarse.upsampled(h, w, &level.source, ctx.seed),
         };
         let coarsest = j == n_coarse;
-        for i in 0..iterations(j) {
-            let mut pixels = Pixels::voted(ctx, &f, level, plan.wrap);
-            let fade = 1.0 - (i + 1) as f32 / iterations(j) as f32;
-            pixels.match_global(level, if coarsest { fade } else { 0.0 });
+        let mut usage = Usage::of(&f, &level.source, plan.uniformity * level.usage_unit);
+        let (iterations, search) = effort(plan, level, coarsest);
+        for i in 0..iterations {
+            let mut votes = vote(ctx.simd, &f, &level.source, plan.wrap);
+            let fade = 1.0 - (i + 1) as f32 / iterations as f32;
+            match_global(&mut votes, level, if coarsest { fade } else { 0.0 });
             if let Some(sigma) = plan.sigma {
+                let (height, width) = (votes.height, votes.width);
+                let domain = Domain { height, width, wrap_y: plan.wrap.y, wrap_x: plan.wrap.x };
                 let sigma = sigma as f64 * h.min(w) as f64;
-                localhist::project(&mut pixels.lab, pixels.domain, sigma);
+                localhist::project(&mut votes.soft, domain, sigma);
             }
-            let target = pixels.target(level, plan);
-            let usage = Usage::of(&f, &level.source, plan.uniformity * level.usage_unit);
-            let search = if coarsest {
-                Search { pass, radius: 0, n_random: 8 }
-            } else {
-                Search { pass, radius: 64, n_random: 4 }
-            };
+            let target = canvas(&votes, plan, (h, w));
+            let now = Usage::of(&f, &level.source, plan.uniformity * level.usage_unit);
+            usage = now.averaged(&usage);
+            let search = Search { pass, ..search };
             patchmatch::pass(ctx, &target, &level.source, &usage, plan.wrap, search, &mut f)?;
             pass += 1;
         }
@@ -99,14 +99,13 @@ pub fn run(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, plan: &Plan) -> Resu
     let field = field.expect("there is at least one level");
     let half = plan.patch / 2;
     let finest = &levels[0];
-    let mut yx: Vec<seams::From> =
-        field.pos.iter().map(|p| [(p.y() + half) as u32, (p.x() + half) as u32]).collect();
-    let pixels = Pixels::voted(ctx, &field, finest, plan.wrap);
-    let target = pixels.delivered(finest, plan);
+    let center = |p: &Pos| [(p.y() + half) as u32, (p.x() + half) as u32];
+    let mut yx: Vec<seams::From> = field.pos.iter().map(center).collect();
+    let votes = vote(ctx.simd, &field, &finest.source, plan.wrap);
     let canvas = seams::Canvas {
         source: &finest.source.image,
         usable: mask.map(Mask::usable),
-        target: &target,
+        target: &without_apron(&votes, plan, plan.size),
         wrap: plan.wrap,
     };
     seams::settle(ctx, &canvas, &mut yx, SEAM_SWEEPS)?;
@@ -125,74 +124,64 @@ pub fn memory_bytes(photo: (usize, usize), output: (usize, usize)) -> u64 {
     (PHOTO * pixels(photo) + OUTPUT * pixels(output)) / 4 * 5
 }
 
-/// The current texture in L*a*b*, with an apron on the axes that do not wrap.
-struct Pixels {
-    lab: Vec<Pixel>,
-    domain: Domain,
+/// Picks what to do at a level: iterations, and how far to search.
+fn effort(plan: &Plan, level: &Level, coarsest: bool) -> (u32, Search) {
+    let finest = level.size == plan.size;
+    if finest && !coarsest {
+        (plan.fine_iterations.div_ceil(2), Search { pass: 0, radius: 32, n_random: 2 })
+    } else if coarsest {
+        (plan.coarse_iterations, Search { pass: 0, radius: 0, n_random: 8 })
+    } else {
+        (plan.fine_iterations, Search { pass: 0, radius: 32, n_random: 2 })
+    }
 }
 
-impl Pixels {
-    fn voted(ctx: &Ctx, field: &Field, level: &Level, wrap: Wrap) -> Self {
-        use rayon::prelude::*;
-        let votes: Votes = vote(ctx.simd, field, &level.source, wrap);
-        let domain =
-            Domain { height: votes.height, width: votes.width, wrap_y: wrap.y, wrap_x: wrap.x };
-        let codes = &level.codes;
-        let lab = (0..votes.sums.len())
-            .into_par_iter()
-            .map(|i| {
-                let count = votes.count(i / votes.width, i % votes.width) as f32;
-                codes.lab(votes.sums[i].map(|s| s as f32 / count))
-            })
-            .collect();
-        Self { lab, domain }
-    }
-
-    /// Moves each channel's values towards the exemplar's distribution: `Q_target = alpha Q_e +
-    /// (1 - alpha) Q_f`.
-    fn match_global(&mut self, level: &Level, alpha: f32) {
-        use rayon::prelude::*;
-        for k in 0..4 {
-            let alpha = if k == CONTRAST { alpha.max(CONTRAST_PULL) } else { alpha };
-            let bins = Bins::covering(self.lab.iter().map(|px| px[k]), 256);
-            let own = Distribution::of(self.lab.iter().map(|px| px[k]), bins);
-            let quantiles = &level.quantiles[k];
-            self.lab.par_iter_mut().for_each(|px| {
-                let wanted = quantiles.at(own.share_below(px[k]));
-                px[k] += alpha * (wanted - px[k]);
-            });
+/// Moves each channel's values towards the exemplar's distribution: `Q_target = alpha Q_e +
+/// (1 - alpha) Q_f`, where the contrast is pulled at least by [`CONTRAST_PULL`].
+fn match_global(votes: &mut Votes, level: &Level, alpha: f32) {
+    for k in 0..4 {
+        let alpha = if k == CONTRAST { alpha.max(CONTRAST_PULL) } else { alpha };
+        if alpha <= 0.0 {
+            continue;
         }
+        let own = Distribution::of(votes.soft.iter().map(|px| px[k])).expect("some pixels");
+        let table = level.quantiles[k].matching_table(&own, alpha);
+        votes.soft.par_iter_mut().for_each(|px| px[k] = table[px[k] as usize]);
     }
+}
 
-    /// The texture as codes, without apron.
-    fn delivered(&self, level: &Level, plan: &Plan) -> MatchImage {
-        let ((h, w), half) = (level.size, plan.patch / 2);
-        let y0 = if plan.wrap.y { 0 } else { half };
-        let x0 = if plan.wrap.x { 0 } else { half };
-        let mut image = MatchImage::new(h, w);
-        image.fill_rows(|y, row| {
-            let from = &self.lab[(y + y0) * self.domain.width + x0..];
-            row.iter_mut().zip(from).for_each(|(px, &lab)| *px = level.codes.encode(lab));
-        });
-        image
-    }
-
-    /// The texture as codes on the canvas, apron included.
-    fn target(&self, level: &Level, plan: &Plan) -> MatchImage {
-        let ((h, w), n) = (level.size, plan.patch);
-        let half = n / 2;
-        let mut target = MatchImage::new(h + n - 1, w + n - 1);
-        let codes: &Codes = &level.codes;
-        target.fill_rows(|y, row| {
-            let from = |i: usize, n: usize, wrap: bool| {
-                if wrap { (i + n * half - half) % n } else { i }
-            };
-            let y = from(y, h, plan.wrap.y);
-            for (x, px) in row.iter_mut().enumerate() {
-                let x = from(x, w, plan.wrap.x);
-                *px = codes.encode(self.lab[y * self.domain.width + x]);
+/// The votes as codes, `rows` x `cols` of them starting at (`y0`, `x0`), which wrap around.
+fn rounded_codes(
+    votes: &Votes,
+    (y0, x0): (isize, isize),
+    (rows, cols): (usize, usize),
+) -> MatchImage {
+    let from =
+        |i: usize, start: isize, n: usize| (i as isize + start).rem_euclid(n as isize) as usize;
+    let mut image = MatchImage::new(rows, cols);
+    image.fill_rows(|y, row| {
+        let line = &votes.soft[from(y, y0, votes.height) * votes.width..][..votes.width];
+        let mut x = from(0, x0, votes.width);
+        for px in row {
+            *px = line[x].map(|v| ((v + (1 << (SOFT_BITS - 1))) >> SOFT_BITS) as u8);
+            x += 1;
+            if x == votes.width {
+                x = 0;
             }
-        });
-        target
-    }
+        }
+    });
+    image
+}
+
+/// The search's target: the texture with an apron of `patch - 1`, wrapped or voted.
+fn canvas(votes: &Votes, plan: &Plan, (h, w): (usize, usize)) -> MatchImage {
+    let apron = |wrap: bool| if wrap { -((plan.patch / 2) as isize) } else { 0 };
+    let size = (h + plan.patch - 1, w + plan.patch - 1);
+    rounded_codes(votes, (apron(plan.wrap.y), apron(plan.wrap.x)), size)
+}
+
+/// The texture without any apron.
+fn without_apron(votes: &Votes, plan: &Plan, size: (usize, usize)) -> MatchImage {
+    let start = |wrap: bool| if wrap { 0 } else { (plan.patch / 2) as isize };
+    rounded_codes(votes, (start(plan.wrap.y), start(plan.wrap.x)), size)
 }

@@ -88,9 +88,6 @@ pub trait Kernel: Copy + Send + Sync {
     /// Inner product of the held patch and the patch of `image` whose top left pixel has index
     /// `at` (over rows, columns and channels).
     fn dot(&self, query: &Self::Query, image: &MatchImage, at: usize) -> i32;
-
-    /// Asks the cache for the patch of `image` at `at`.
-    fn prefetch(&self, image: &MatchImage, at: usize);
 }
 
 /// Work that wants a [`Kernel`]; [`with_kernel`] calls it with the best one.

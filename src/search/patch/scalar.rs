@@ -35,9 +35,6 @@ impl Kernel for Scalar {
         }
         sum
     }
-
-    #[inline]
-    fn prefetch(&self, _image: &MatchImage, _at: usize) {}
 }
 
 /// Squared distance of two patches by its definition: the sum over rows, columns and channels of

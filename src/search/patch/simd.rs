@@ -2,7 +2,7 @@
 //!
 //! Why not a safe wrapper crate: the hot load is an unaligned one at a computed offset, 11 of them
 //! per comparison; one range check per comparison instead of one per load is worth a third of the
-//! speed. The check is in `row_pointer`.
+//! speed. The check is in `checked`.
 
 #![expect(unsafe_code, reason = "SIMD loads at computed offsets; each use has a SAFETY comment")]
 
@@ -32,18 +32,13 @@ pub(super) fn detect() -> Simd {
 pub(super) fn dispatch<W: WithKernel>(limit: Simd, patch: usize, work: W) -> W::Output {
     #[cfg(target_arch = "x86_64")]
     {
-        // The default side gets code with its rows unrolled; 0 stands for "any side".
-        let level = detect().min(limit);
         // SAFETY: `detect` has seen the features that each function is compiled for.
         unsafe {
-            match (level, patch) {
-                (Simd::Avx512Vnni, 11) => return x86::run_vnni::<11, W>(patch, work),
-                (Simd::Avx512Vnni, _) => return x86::run_vnni::<0, W>(patch, work),
-                (Simd::Avx512, 11) => return x86::run_avx512::<11, W>(patch, work),
-                (Simd::Avx512, _) => return x86::run_avx512::<0, W>(patch, work),
-                (Simd::Avx2, 11) => return x86::run_avx2::<11, W>(patch, work),
-                (Simd::Avx2, _) => return x86::run_avx2::<0, W>(patch, work),
-                (Simd::Scalar, _) => {}
+            match detect().min(limit) {
+                Simd::Avx512Vnni => return x86::run_vnni(patch, work),
+                Simd::Avx512 => return x86::run_avx512(patch, work),
+                Simd::Avx2 => return x86::run_avx2(patch, work),
+                Simd::Scalar => {}
             }
         }
     }
@@ -57,155 +52,233 @@ mod x86 {
     use super::super::{Kernel, MatchImage, PATCH_MAX, WithKernel};
     use super::TAIL;
 
-    /// Bytes a held row takes: the longest patch row, rounded up to whole registers.
-    const ROW: usize = 128;
-
-    /// A patch whose rows are padded with zeros, so that kernels may multiply past its right end.
-    #[derive(Debug, Clone)]
-    #[repr(align(64))]
-    pub(super) struct Held([[u8; ROW]; PATCH_MAX]);
-
-    /// Pointer to the patch at pixel index `at`; all its rows, and 64 bytes from any place inside
-    /// them, may be read.
+    /// Panics unless the patch at pixel index `at`, and 64 bytes from any place inside it, may be
+    /// read; returns a pointer to its first pixel.
     #[inline(always)]
-    fn row_pointer(image: &MatchImage, at: usize, patch: usize) -> *const u8 {
-        let last = (at + (patch - 1) * image.width + patch) * 4;
-        assert!(last + TAIL <= image.codes.len(), "patch outside its picture");
-        // SAFETY: `at * 4 <= last`, which lies inside the allocation by the line above.
+    fn checked(image: &MatchImage, at: usize, patch: usize) -> *const u8 {
+        let end = (at + (patch - 1) * image.width + patch) * 4;
+        assert!(end + TAIL <= image.codes.len(), "patch outside its picture");
+        // SAFETY: `at * 4 <= end`, which lies inside the allocation by the line above.
         unsafe { image.codes.as_ptr().add(at * 4) }
     }
 
-    macro_rules! kernel {
-        ($name:ident, $features:literal, $run:ident, $dot_row:ident, $sum:ident, $zero:ident, $lanes:literal) => {
-            /// `N`: patch side, or 0 for the side in `patch`.
-            #[derive(Debug, Clone, Copy)]
-            pub(super) struct $name<const N: usize> {
-                patch: usize,
+    /// Sum of products of codes, with and without the VNNI instruction.
+    trait MultiplyAdd512: Copy + Send + Sync {
+        /// `sum + f * e`, in groups of four.
+        ///
+        /// # Safety
+        /// The CPU must have the features of the kernel that uses this.
+        unsafe fn multiply_add(sum: __m512i, f: __m512i, e: __m512i) -> __m512i;
+    }
+
+    #[derive(Debug, Clone, Copy)]
+    pub(super) struct Vnni;
+
+    impl MultiplyAdd512 for Vnni {
+        #[inline(always)]
+        unsafe fn multiply_add(sum: __m512i, f: __m512i, e: __m512i) -> __m512i {
+            // SAFETY: the caller's promise.
+            unsafe { _mm512_dpbusd_epi32(sum, f, e) }
+        }
+    }
+
+    #[derive(Debug, Clone, Copy)]
+    pub(super) struct NoVnni;
+
+    impl MultiplyAdd512 for NoVnni {
+        #[inline(always)]
+        unsafe fn multiply_add(sum: __m512i, f: __m512i, e: __m512i) -> __m512i {
+            // SAFETY: the caller's promise. Two products of 7-bit codes fit into 16 bits.
+            unsafe {
+                let pairs = _mm512_maddubs_epi16(f, e);
+                _mm512_add_epi32(sum, _mm512_madd_epi16(pairs, _mm512_set1_epi16(1)))
             }
+        }
+    }
 
-            impl<const N: usize> $name<N> {
-                #[inline(always)]
-                fn side(self) -> usize {
-                    if N == 0 { self.patch } else { N }
-                }
+    /// The default patch side: a row is one register, and all rows stay in registers.
+    #[derive(Debug, Clone, Copy)]
+    struct Eleven<M>(std::marker::PhantomData<M>);
+
+    impl<M: MultiplyAdd512> Kernel for Eleven<M> {
+        type Query = [__m512i; 11];
+
+        #[inline(always)]
+        fn query(&self) -> [__m512i; 11] {
+            // SAFETY: a value of this type exists only inside `run_*`, where the features are.
+            [unsafe { _mm512_setzero_si512() }; 11]
+        }
+
+        #[inline(always)]
+        fn hold(&self, query: &mut [__m512i; 11], image: &MatchImage, at: usize) {
+            let start = checked(image, at, 11);
+            for (row, held) in query.iter_mut().enumerate() {
+                // SAFETY: inside the picture by `checked`; features as above. The mask cuts the
+                // row at its eleventh pixel, so that longer reads of the other side do no harm.
+                *held = unsafe {
+                    _mm512_maskz_loadu_epi32(0x7ff, start.add(row * image.width * 4).cast())
+                };
             }
+        }
 
-            impl<const N: usize> Kernel for $name<N> {
-                type Query = Held;
-
-                fn query(&self) -> Held {
-                    Held([[0; ROW]; PATCH_MAX])
+        #[inline(always)]
+        fn dot(&self, query: &[__m512i; 11], image: &MatchImage, at: usize) -> i32 {
+            let start = checked(image, at, 11);
+            let stride = image.width * 4;
+            // SAFETY: inside the picture, or its tail, by `checked`; features as above.
+            unsafe {
+                // Two sums, so that no multiply-add waits for the one before it.
+                let mut sums = [_mm512_setzero_si512(); 2];
+                for (row, &f) in query.iter().enumerate() {
+                    let e = _mm512_loadu_si512(start.add(row * stride).cast());
+                    sums[row % 2] = M::multiply_add(sums[row % 2], f, e);
                 }
+                _mm512_reduce_add_epi32(_mm512_add_epi32(sums[0], sums[1]))
+            }
+        }
+    }
 
-                #[inline(always)]
-                fn hold(&self, query: &mut Held, image: &MatchImage, at: usize) {
-                    let n = self.side();
-                    for row in 0..n {
-                        let start = (at + row * image.width) * 4;
-                        query.0[row][..4 * n].copy_from_slice(&image.codes[start..start + 4 * n]);
+    /// Any patch side: a row is one register or two.
+    #[derive(Debug, Clone, Copy)]
+    struct Any512<M> {
+        patch: usize,
+        method: std::marker::PhantomData<M>,
+    }
+
+    impl<M: MultiplyAdd512> Kernel for Any512<M> {
+        type Query = [[__m512i; 2]; PATCH_MAX];
+
+        #[inline(always)]
+        fn query(&self) -> Self::Query {
+            // SAFETY: a value of this type exists only inside `run_*`, where the features are.
+            [[unsafe { _mm512_setzero_si512() }; 2]; PATCH_MAX]
+        }
+
+        #[inline(always)]
+        fn hold(&self, query: &mut Self::Query, image: &MatchImage, at: usize) {
+            let start = checked(image, at, self.patch);
+            let mask = (1u32 << self.patch) - 1;
+            for (row, held) in query[..self.patch].iter_mut().enumerate() {
+                // SAFETY: inside the picture, or its tail, by `checked`; features as above.
+                *held = unsafe {
+                    let row = start.add(row * image.width * 4);
+                    [
+                        _mm512_maskz_loadu_epi32(mask as u16, row.cast()),
+                        _mm512_maskz_loadu_epi32((mask >> 16) as u16, row.add(64).cast()),
+                    ]
+                };
+            }
+        }
+
+        #[inline(always)]
+        fn dot(&self, query: &Self::Query, image: &MatchImage, at: usize) -> i32 {
+            let start = checked(image, at, self.patch);
+            let stride = image.width * 4;
+            // SAFETY: inside the picture, or its tail, by `checked`; features as above.
+            unsafe {
+                let mut sums = [_mm512_setzero_si512(); 2];
+                for (row, held) in query[..self.patch].iter().enumerate() {
+                    let row = start.add(row * stride);
+                    sums[0] = M::multiply_add(sums[0], held[0], _mm512_loadu_si512(row.cast()));
+                    if self.patch > 16 {
+                        let e = _mm512_loadu_si512(row.add(64).cast());
+                        sums[1] = M::multiply_add(sums[1], held[1], e);
                     }
                 }
+                _mm512_reduce_add_epi32(_mm512_add_epi32(sums[0], sums[1]))
+            }
+        }
+    }
 
-                #[inline(always)]
-                fn dot(&self, query: &Held, image: &MatchImage, at: usize) -> i32 {
-                    let n = self.side();
-                    let start = row_pointer(image, at, n);
-                    let stride = image.width * 4;
-                    // SAFETY: `row_pointer` checked the range that is read; a value of this type
-                    // exists only inside `$run`, where the features are present.
-                    unsafe {
-                        let mut sum = $zero();
-                        for row in 0..n {
-                            let e = start.add(row * stride);
-                            let f = query.0[row].as_ptr();
-                            let mut i = 0;
-                            while i < 4 * n {
-                                sum = $dot_row(sum, f.add(i), e.add(i));
-                                i += $lanes;
-                            }
-                        }
-                        $sum(sum)
-                    }
-                }
+    /// AVX2, any patch side: a row is one to three registers. `N` is the side if it is known to
+    /// the compiler, else 0.
+    #[derive(Debug, Clone, Copy)]
+    struct Any256<const N: usize> {
+        patch: usize,
+    }
 
-                #[inline(always)]
-                fn prefetch(&self, image: &MatchImage, at: usize) {
-                    let n = self.side();
-                    let start = row_pointer(image, at, n);
-                    for row in 0..n {
-                        // SAFETY: inside the picture by `row_pointer`.
-                        unsafe {
-                            _mm_prefetch::<_MM_HINT_T0>(start.add(row * image.width * 4).cast());
-                        }
-                    }
+    impl<const N: usize> Any256<N> {
+        #[inline(always)]
+        fn side(self) -> usize {
+            if N == 0 { self.patch } else { N }
+        }
+    }
+
+    impl<const N: usize> Kernel for Any256<N> {
+        type Query = [[__m256i; 3]; PATCH_MAX];
+
+        #[inline(always)]
+        fn query(&self) -> Self::Query {
+            // SAFETY: a value of this type exists only inside `run_avx2`, where the feature is.
+            [[unsafe { _mm256_setzero_si256() }; 3]; PATCH_MAX]
+        }
+
+        #[inline(always)]
+        fn hold(&self, query: &mut Self::Query, image: &MatchImage, at: usize) {
+            let n = self.side();
+            let start = checked(image, at, n);
+            for (row, held) in query[..n].iter_mut().enumerate() {
+                for (i, held) in held.iter_mut().enumerate().take(n.div_ceil(8)) {
+                    // Lanes of pixels beyond the patch's right end are zero.
+                    let inside = n as i32 - 8 * i as i32;
+                    // SAFETY: inside the picture, or its tail, by `checked`; feature as above.
+                    *held = unsafe {
+                        let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+                        let mask = _mm256_cmpgt_epi32(_mm256_set1_epi32(inside), lanes);
+                        let at = start.add(row * image.width * 4 + 32 * i);
+                        _mm256_and_si256(_mm256_loadu_si256(at.cast()), mask)
+                    };
                 }
             }
+        }
 
-            /// Runs the work compiled for these features.
-            #[target_feature(enable = $features)]
-            pub(super) fn $run<const N: usize, W: WithKernel>(patch: usize, work: W) -> W::Output {
-                work.run($name::<N> { patch })
+        #[inline(always)]
+        fn dot(&self, query: &Self::Query, image: &MatchImage, at: usize) -> i32 {
+            let n = self.side();
+            let start = checked(image, at, n);
+            let stride = image.width * 4;
+            // SAFETY: inside the picture, or its tail, by `checked`; feature as above.
+            unsafe {
+                let one = _mm256_set1_epi16(1);
+                let mut sums = [_mm256_setzero_si256(); 3];
+                for (row, held) in query[..n].iter().enumerate() {
+                    for (i, &f) in held.iter().enumerate().take(n.div_ceil(8)) {
+                        let e = _mm256_loadu_si256(start.add(row * stride + 32 * i).cast());
+                        let pairs = _mm256_maddubs_epi16(f, e);
+                        sums[i] = _mm256_add_epi32(sums[i], _mm256_madd_epi16(pairs, one));
+                    }
+                }
+                let sum = _mm256_add_epi32(_mm256_add_epi32(sums[0], sums[1]), sums[2]);
+                let sum =
+                    _mm_add_epi32(_mm256_castsi256_si128(sum), _mm256_extracti128_si256::<1>(sum));
+                let sum = _mm_add_epi32(sum, _mm_shuffle_epi32::<0b01_00_11_10>(sum));
+                let sum = _mm_add_epi32(sum, _mm_shuffle_epi32::<0b10_11_00_01>(sum));
+                _mm_cvtsi128_si32(sum)
             }
-        };
-    }
-
-    #[inline(always)]
-    unsafe fn vnni_row(sum: __m512i, f: *const u8, e: *const u8) -> __m512i {
-        unsafe {
-            _mm512_dpbusd_epi32(sum, _mm512_load_si512(f.cast()), _mm512_loadu_si512(e.cast()))
         }
     }
 
-    #[inline(always)]
-    unsafe fn avx512_row(sum: __m512i, f: *const u8, e: *const u8) -> __m512i {
-        unsafe {
-            let products =
-                _mm512_maddubs_epi16(_mm512_load_si512(f.cast()), _mm512_loadu_si512(e.cast()));
-            _mm512_add_epi32(sum, _mm512_madd_epi16(products, _mm512_set1_epi16(1)))
-        }
+    /// Runs the work compiled for AVX-512 with VNNI.
+    #[target_feature(enable = "avx2,avx512f,avx512bw,avx512vnni")]
+    pub(super) fn run_vnni<W: WithKernel>(patch: usize, work: W) -> W::Output {
+        run512::<Vnni, W>(patch, work)
+    }
+
+    /// Runs the work compiled for AVX-512.
+    #[target_feature(enable = "avx2,avx512f,avx512bw")]
+    pub(super) fn run_avx512<W: WithKernel>(patch: usize, work: W) -> W::Output {
+        run512::<NoVnni, W>(patch, work)
     }
 
     #[inline(always)]
-    unsafe fn avx2_row(sum: __m256i, f: *const u8, e: *const u8) -> __m256i {
-        unsafe {
-            let products =
-                _mm256_maddubs_epi16(_mm256_load_si256(f.cast()), _mm256_loadu_si256(e.cast()));
-            _mm256_add_epi32(sum, _mm256_madd_epi16(products, _mm256_set1_epi16(1)))
-        }
+    fn run512<M: MultiplyAdd512, W: WithKernel>(patch: usize, work: W) -> W::Output {
+        let method = std::marker::PhantomData::<M>;
+        if patch == 11 { work.run(Eleven(method)) } else { work.run(Any512 { patch, method }) }
     }
 
-    #[inline(always)]
-    unsafe fn sum512(v: __m512i) -> i32 {
-        unsafe { _mm512_reduce_add_epi32(v) }
+    /// Runs the work compiled for AVX2.
+    #[target_feature(enable = "avx2")]
+    pub(super) fn run_avx2<W: WithKernel>(patch: usize, work: W) -> W::Output {
+        if patch == 11 { work.run(Any256::<11> { patch }) } else { work.run(Any256::<0> { patch }) }
     }
-
-    #[inline(always)]
-    unsafe fn sum256(v: __m256i) -> i32 {
-        unsafe {
-            let v = _mm_add_epi32(_mm256_castsi256_si128(v), _mm256_extracti128_si256::<1>(v));
-            let v = _mm_add_epi32(v, _mm_shuffle_epi32::<0b01_00_11_10>(v));
-            let v = _mm_add_epi32(v, _mm_shuffle_epi32::<0b10_11_00_01>(v));
-            _mm_cvtsi128_si32(v)
-        }
-    }
-
-    kernel!(
-        Vnni,
-        "avx2,avx512f,avx512bw,avx512vnni",
-        run_vnni,
-        vnni_row,
-        sum512,
-        _mm512_setzero_si512,
-        64
-    );
-    kernel!(
-        Avx512,
-        "avx2,avx512f,avx512bw",
-        run_avx512,
-        avx512_row,
-        sum512,
-        _mm512_setzero_si512,
-        64
-    );
-    kernel!(Avx2, "avx2", run_avx2, avx2_row, sum256, _mm256_setzero_si256, 32);
 }
