@@ -8,11 +8,12 @@ VENV := .venv
 BIN := $(VENV)/bin
 WHEELS := target/wheels
 PHOTO ?=
+BENCH ?=
 EXEMPLARS ?= ../shared/exemplars
 GALLERY ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-rust test-python lint format gallery readme-pictures bench wheel ci clean
+.PHONY: help setup demo test test-rust test-python lint format gallery readme-pictures bench bench-peers bench-record wheel ci clean
 
 help: ## List the targets.
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-15s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -72,7 +73,14 @@ readme-pictures: setup ## Make the README's pictures anew, in docs/pictures/.
 	$(BIN)/python docs/readme_pictures.py
 
 bench: ## Measure the kernels.
-	$(CARGO) bench --locked
+	$(CARGO) bench --locked --bench kernels
+
+bench-peers: $(BIN)/.ready ## Compare with G'MIC and texture-synthesis (PHOTO=file, BENCH="--large ...").
+	$(BIN)/python benches/peers.py $(if $(PHOTO),"$(PHOTO)") $(BENCH)
+
+bench-record: $(BIN)/.ready ## Measure all and keep it in benches/record/.
+	TEXFORGE_BENCH_TABLE=$(CURDIR)/target/kernels.md $(CARGO) bench --locked --bench kernels
+	$(BIN)/python benches/peers.py $(if $(PHOTO),"$(PHOTO)") $(BENCH) --kernels target/kernels.md --record $(shell date +%F)
 
 wheel: $(BIN)/.ready ## Build the wheel for distribution, in dist/.
 	$(BIN)/maturin build --release --out dist

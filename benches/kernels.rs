@@ -1,3 +1,438 @@
-//! Benchmarks of the kernels.
+//! Speed of the kernels, by CPU time on one thread. Each first proves its answer.
+//!
+//! `make bench`. With `TEXFORGE_BENCH_TABLE=FILE` the table of shares of the machine's limit is
+//! also written to FILE.
 
-fn main() {}
+#![expect(
+    clippy::print_stdout,
+    clippy::unwrap_used,
+    reason = "a program that prints measurements and stops at the first surprise"
+)]
+
+mod common;
+
+use std::fmt::Write as _;
+use std::hint::black_box;
+
+use common::{
+    CpuTime, codes, each, exhaustive, median, nearest, noise_codes, pebbles, samples, timed,
+};
+use criterion::{BatchSize, BenchmarkId, Criterion};
+use texforge::base::rng::Rng;
+use texforge::search::field::{Field, Pos};
+use texforge::search::patch::{
+    Kernel, MatchImage, WithKernel, detected, distance_squared, with_kernel,
+};
+use texforge::search::patchmatch::{Search, Usage, Wrap, distances, pass};
+use texforge::search::seams::{self, Canvas};
+use texforge::search::source::Source;
+use texforge::search::vote::vote;
+use texforge::signal::histogram::{SOFT_BITS, SOFT_MAX, Soft};
+use texforge::signal::localhist::{Domain, LocalDistributions, project};
+use texforge::{Ctx, Simd};
+
+type Bench = Criterion<CpuTime>;
+
+const N: usize = 11;
+const SIDE: usize = 512;
+const TORUS: Wrap = Wrap { y: true, x: true };
+const LEVELS: [Simd; 4] = [Simd::Scalar, Simd::Avx2, Simd::Avx512, Simd::Avx512Vnni];
+
+fn main() {
+    let ctx = Ctx::new(0, 1).unwrap();
+    // Everything on the one worker of the pool, whose CPU time is measured.
+    ctx.install(|| {
+        let mut bench = Criterion::default()
+            .with_measurement(CpuTime)
+            .without_plots()
+            .sample_size(20)
+            .warm_up_time(std::time::Duration::from_millis(500))
+            .measurement_time(std::time::Duration::from_secs(2))
+            .configure_from_args();
+        inner_products(&mut bench);
+        passes(&mut bench, &ctx);
+        votes(&mut bench, &ctx);
+        projection(&mut bench);
+        settling(&mut bench, &ctx);
+        bench.final_summary();
+        if !std::env::args().any(|a| a == "--test") {
+            let table = limits(&ctx) + &quality(&ctx);
+            println!("\n{table}");
+            if let Some(file) = std::env::var_os("TEXFORGE_BENCH_TABLE") {
+                std::fs::write(file, table).unwrap();
+            }
+        }
+        Ok(())
+    })
+    .unwrap();
+}
+
+// ---------------------------------------------------------------------------------------------
+// Patch inner products
+
+/// One held patch against the patches at many places of a picture.
+struct Dots {
+    image: MatchImage,
+    /// Pixel indices.
+    at: Vec<u32>,
+}
+
+impl Dots {
+    /// Every position of a picture that fits into the first-level cache, round and round.
+    fn hot() -> Self {
+        let image = noise_codes(24, 24);
+        let side = 24 - N + 1;
+        let all = (0..side * side).map(|i| ((i / side) * 24 + i % side) as u32);
+        Self { image, at: all.cycle().take(1 << 14).collect() }
+    }
+
+    /// Random positions.
+    fn random(side: usize) -> Self {
+        let image = noise_codes(side, side);
+        let place = |i| {
+            let mut rng = Rng::new(2, 0, 0, i);
+            let n = (side - N + 1) as u32;
+            rng.below(n) * side as u32 + rng.below(n)
+        };
+        Self { image, at: (0..1 << 14).map(place).collect() }
+    }
+
+    fn sum(&self, simd: Simd) -> i64 {
+        struct Sum<'a>(&'a Dots);
+        impl WithKernel for Sum<'_> {
+            type Output = i64;
+            #[inline(always)]
+            fn run<K: Kernel>(self, kernel: K) -> i64 {
+                let Dots { image, at } = self.0;
+                let mut query = kernel.query();
+                kernel.hold(&mut query, image, 0);
+                at.iter().map(|&at| kernel.dot(&query, image, at as usize) as i64).sum()
+            }
+        }
+        with_kernel(simd, N, Sum(self))
+    }
+
+    /// The same sum through the definition of the squared distance.
+    fn expected(&self) -> i64 {
+        let zero = MatchImage::new(N, N);
+        let norm = |at: usize| distance_squared(&self.image, at, &zero, 0, N) as i64;
+        let own = norm(0);
+        let product = |&at: &u32| {
+            let at = at as usize;
+            (own + norm(at) - distance_squared(&self.image, 0, &self.image, at, N) as i64) / 2
+        };
+        self.at.iter().map(product).sum()
+    }
+}
+
+fn levels() -> impl Iterator<Item = Simd> {
+    LEVELS.into_iter().filter(|&simd| detected(simd) == simd)
+}
+
+fn inner_products(bench: &mut Bench) {
+    let mut group = bench.benchmark_group("inner product 11x11");
+    for (place, dots) in [
+        ("hot in L1", Dots::hot()),
+        ("random in 512x512", Dots::random(512)),
+        ("random in 2048x2048", Dots::random(2048)),
+    ] {
+        let expected = dots.expected();
+        group.throughput(each(dots.at.len()));
+        for simd in levels() {
+            assert_eq!(dots.sum(simd), expected, "{simd:?}, {place}");
+            group.bench_function(BenchmarkId::new(format!("{simd:?}"), place), |b| {
+                b.iter(|| black_box(&dots).sum(simd));
+            });
+        }
+    }
+}
+
+// ---------------------------------------------------------------------------------------------
+// PatchMatch
+
+/// A source, an output made of its pieces, and what is searched.
+struct Scene {
+    source: Source,
+    target: MatchImage,
+    usage: Usage,
+    wrap: Wrap,
+    search: Search,
+    field: Field,
+}
+
+impl Scene {
+    /// The output is a quilt of pieces of the source, each pixel off by a little; the field is
+    /// either the quilt's own or random.
+    fn new(coherent: bool) -> Self {
+        const PIECE: usize = 40;
+        let source = Source::new(pebbles(SIDE, SIDE, 3), N, None).unwrap();
+        let piece = |y: usize, x: usize| {
+            let mut rng = Rng::new(4, 0, 0, ((y / PIECE) * SIDE + x / PIECE) as u64);
+            let n = (source.rows() - PIECE) as u32;
+            Pos::new(rng.below(n) as usize + y % PIECE, rng.below(n) as usize + x % PIECE)
+        };
+        let pos = (0..SIDE * SIDE).map(|i| piece(i / SIDE, i % SIDE)).collect();
+        let quilt = Field { height: SIDE, width: SIDE, pos };
+        let half = N / 2;
+        let target = codes(SIDE + N - 1, SIDE + N - 1, |y, x| {
+            let (y, x) = ((y + SIDE - half) % SIDE, (x + SIDE - half) % SIDE);
+            let from = piece(y, x);
+            let noise = Rng::new(5, 0, 0, (y * SIDE + x) as u64).next_u32().to_le_bytes();
+            let px = source.image.pixel(from.y() + half, from.x() + half);
+            std::array::from_fn(|k| px[k] + noise[k] % 4)
+        });
+        let field = if coherent { quilt } else { Field::random(SIDE, SIDE, &source, 6) };
+        let usage = Usage::of(&field, &source, 500.0);
+        let search = Search { pass: 0, radius: 64, n_random: 4 };
+        Self { source, target, usage, wrap: TORUS, search, field }
+    }
+
+    fn pass(&self, ctx: &Ctx) -> Field {
+        let mut field = self.field.clone();
+        pass(ctx, &self.target, &self.source, &self.usage, self.wrap, self.search, &mut field)
+            .unwrap();
+        field
+    }
+
+    /// Patch comparisons that the pass cannot do without: for each output pixel its own match
+    /// (the target has changed), the different positions that its two neighbours propose, and the
+    /// random ones. (A position tried twice counts once; that a random one equals the best has a
+    /// chance of some thousandths and is not subtracted.)
+    fn comparisons(&self, after: &Field) -> usize {
+        let mut count = 0;
+        for y in 0..SIDE {
+            for x in 0..SIDE {
+                let own = self.field.pos[y * SIDE + x];
+                // Pass 0 scans forward: left and upper neighbour are those of the new field.
+                let beside =
+                    after.pos[y * SIDE + (x + SIDE - 1) % SIDE].shifted(0, 1, &self.source);
+                let above = after.pos[(y + SIDE - 1) % SIDE * SIDE + x].shifted(1, 0, &self.source);
+                count += 1 + self.search.n_random as usize;
+                count += usize::from(beside.is_some_and(|p| p != own));
+                count += usize::from(above.is_some_and(|p| p != own && above != beside));
+            }
+        }
+        count
+    }
+
+    /// Sum of the scores that the search minimizes, without the usage (which is kept equal by
+    /// `Usage::free` where this is asserted).
+    fn cost(&self, field: &Field) -> i64 {
+        let each = distances(Simd::default(), &self.target, &self.source, field);
+        each.into_iter().map(i64::from).sum()
+    }
+}
+
+fn passes(bench: &mut Bench, ctx: &Ctx) {
+    let mut group = bench.benchmark_group("PatchMatch pass 512x512");
+    for (name, coherent) in [("coherent field", true), ("random field", false)] {
+        let mut scene = Scene::new(coherent);
+        let usage = std::mem::replace(&mut scene.usage, Usage::free(&scene.source));
+        let before = distances(Simd::default(), &scene.target, &scene.source, &scene.field);
+        let after = distances(Simd::default(), &scene.target, &scene.source, &scene.pass(ctx));
+        assert!(before.iter().zip(&after).all(|(b, a)| a <= b), "{name}: a match got worse");
+        let two = Ctx::new(0, 2).unwrap();
+        let other = two.install(|| Ok(scene.pass(&two))).unwrap();
+        assert_eq!(other.pos, scene.pass(ctx).pos, "{name}: depends on the number of threads");
+        if !coherent {
+            assert!(scene.cost(&other) * 2 < scene.cost(&scene.field), "{name}: hardly better");
+        }
+        scene.usage = usage;
+        group.throughput(each(SIDE * SIDE));
+        group.bench_function(name, |b| b.iter(|| scene.pass(ctx)));
+    }
+}
+
+// ---------------------------------------------------------------------------------------------
+// The other stages of an iteration
+
+fn votes(bench: &mut Bench, ctx: &Ctx) {
+    let mut group = bench.benchmark_group("vote 512x512");
+    group.throughput(each(SIDE * SIDE));
+    for (name, coherent) in [("coherent field", true), ("random field", false)] {
+        let scene = Scene::new(coherent);
+        let run = || vote(ctx.simd, &scene.field, &scene.source, TORUS);
+        let votes = run();
+        for i in samples(SIDE * SIDE, 200) {
+            let (y, x) = (i / SIDE, i % SIDE);
+            let mut sum = [0u32; 4];
+            for dy in 0..N {
+                for dx in 0..N {
+                    // The patch whose pixel (dy, dx) lies here has its middle at:
+                    let (cy, cx) = ((y + SIDE + N / 2 - dy) % SIDE, (x + SIDE + N / 2 - dx) % SIDE);
+                    let from = scene.field.pos[cy * SIDE + cx];
+                    let px = scene.source.image.pixel(from.y() + dy, from.x() + dx);
+                    sum.iter_mut().zip(px).for_each(|(s, p)| *s += u32::from(p));
+                }
+            }
+            let mean = sum.map(|s| f64::from(s) * f64::from(1u32 << SOFT_BITS) / (N * N) as f64);
+            let near =
+                votes.soft[i].iter().zip(mean).all(|(&s, m)| (f64::from(s) - m).abs() <= 1.0);
+            assert!(near, "{name}: {:?}, not {mean:?} at {y}, {x}", votes.soft[i]);
+        }
+        group.bench_function(name, |b| b.iter(run));
+    }
+}
+
+fn projection(bench: &mut Bench) {
+    let domain = Domain { height: SIDE, width: SIDE, wrap_y: true, wrap_x: true };
+    let sigma = 0.1 * SIDE as f64;
+    let image = pebbles(SIDE, SIDE, 3);
+    let pixels: Vec<Soft> = (0..SIDE * SIDE)
+        .map(|i| {
+            let (y, x) = (i / SIDE, i % SIDE);
+            // A stain, as in a photo.
+            let stain = if (y as f32 - 200.0).hypot(x as f32 - 300.0) < 80.0 { -20.0 } else { 0.0 };
+            let [a, b, c, _] = image.pixel(y, x).map(f32::from);
+            let soft = |v: f32| (v * (1 << SOFT_BITS) as f32).clamp(0.0, SOFT_MAX as f32) as u16;
+            [a + stain, b, c, (a - b).abs()].map(soft)
+        })
+        .collect();
+    let uneven =
+        |pixels: &[Soft]| LocalDistributions::new(pixels, None, 0, domain, sigma).mean_distance();
+    let mut even = pixels.clone();
+    project(&mut even, domain, sigma);
+    let (before, after) = (uneven(&pixels), uneven(&even));
+    assert!(after < 0.5 * before, "projected from {before} to {after} only");
+    let mut group = bench.benchmark_group("projection 512x512");
+    group.throughput(each(SIDE * SIDE));
+    group.bench_function("4 channels", |b| {
+        b.iter_batched_ref(
+            || pixels.clone(),
+            |pixels| project(pixels, domain, sigma),
+            BatchSize::LargeInput,
+        );
+    });
+}
+
+fn settling(bench: &mut Bench, ctx: &Ctx) {
+    const SWEEPS: u32 = 4;
+    let mut scene = Scene::new(true);
+    // Ragged borders between the pieces, as a search leaves them.
+    scene.field = scene.pass(ctx);
+    let half = (N / 2) as u32;
+    let from: Vec<seams::From> =
+        scene.field.pos.iter().map(|p| [p.y() as u32 + half, p.x() as u32 + half]).collect();
+    let target = codes(SIDE, SIDE, |y, x| scene.target.pixel(y + N / 2, x + N / 2));
+    let canvas =
+        Canvas { source: &scene.source.image, usable: None, target: &target, wrap: scene.wrap };
+    let run = |from: &mut Vec<seams::From>| seams::settle(ctx, &canvas, from, SWEEPS).unwrap();
+    // The number of neighbours from different pieces, weighted by how much they differ.
+    let seam = |from: &[seams::From]| -> i64 {
+        let color = |[y, x]: seams::From| {
+            canvas.source.pixel((y as usize).min(SIDE - 1), (x as usize).min(SIDE - 1))
+        };
+        let difference = |a: [u8; 4], b: [u8; 4]| -> i64 {
+            a.iter().zip(b).map(|(&a, b)| (a as i64 - b as i64).pow(2)).sum()
+        };
+        (0..SIDE * (SIDE - 1))
+            .filter(|i| i % SIDE > 0)
+            .map(|i| {
+                let [y, x] = from[i];
+                let right =
+                    difference(color([y, x + 1]), color(from[i - i % SIDE + (i + 1) % SIDE]));
+                right + difference(color([y + 1, x]), color(from[i + SIDE]))
+            })
+            .sum()
+    };
+    let mut settled = from.clone();
+    run(&mut settled);
+    assert!(settled != from, "nothing moved");
+    assert!(seam(&settled) < seam(&from), "seams got worse");
+    let mut group = bench.benchmark_group("seams 512x512");
+    group.throughput(each(SIDE * SIDE));
+    group.bench_function("4 sweeps", |b| {
+        b.iter_batched_ref(|| from.clone(), run, BatchSize::LargeInput);
+    });
+}
+
+// ---------------------------------------------------------------------------------------------
+// Tables
+
+/// Comparisons per second of everything, against the hot kernel's, measured in turns.
+fn limits(ctx: &Ctx) -> String {
+    const TURNS: usize = 15;
+    let best = detected(Simd::default());
+    let hot = Dots::hot();
+    let scenes = [Scene::new(true), Scene::new(false)];
+    let counts = [0, 1].map(|i| scenes[i].comparisons(&scenes[i].pass(ctx)));
+    let random = [Dots::random(512), Dots::random(2048)];
+    let rate = |n: usize, work: &dyn Fn()| n as f64 / timed(work).0 / 1e6;
+    let hot_rate = || {
+        rate(hot.at.len() * 64, &|| {
+            (0..64).for_each(|_| {
+                black_box(hot.sum(best));
+            })
+        })
+    };
+    // What, comparisons, work.
+    type Row<'a> = (String, usize, Box<dyn Fn() + 'a>);
+    let mut rows: Vec<Row<'_>> = Vec::new();
+    for (name, dots) in ["random in 512x512", "random in 2048x2048"].iter().zip(&random) {
+        let n = dots.at.len() * 32;
+        let work = move || {
+            (0..32).for_each(|_| {
+                black_box(dots.sum(best));
+            })
+        };
+        rows.push((format!("kernel, {name}"), n, Box::new(work)));
+    }
+    for ((name, scene), n) in ["coherent", "random"].iter().zip(&scenes).zip(counts) {
+        let a_pixel = n as f64 / (SIDE * SIDE) as f64;
+        let name = format!("PatchMatch pass, {name} field ({a_pixel:.1} comparisons a pixel)");
+        rows.push((name, n, Box::new(move || drop(black_box(scene.pass(ctx))))));
+    }
+    let mut table = format!(
+        "| {best:?}, 11 x 11, one thread | million comparisons/s | share of the L1 limit |\n\
+         | --- | ---: | ---: |\n"
+    );
+    let hot_best = median((0..TURNS).map(|_| hot_rate()).collect());
+    writeln!(table, "| kernel, hot in L1: the limit | {hot_best:.1} | 100 % |").unwrap();
+    for (name, n, work) in rows {
+        let (mut rates, mut shares) = (Vec::new(), Vec::new());
+        for _ in 0..TURNS {
+            let (before, achieved, after) = (hot_rate(), rate(n, &*work), hot_rate());
+            rates.push(achieved);
+            shares.push(100.0 * achieved / (0.5 * (before + after)));
+        }
+        let (rate, share) = (median(rates), median(shares));
+        writeln!(table, "| {name} | {rate:.1} | {share:.0} % |").unwrap();
+    }
+    table
+}
+
+/// Error and time of nearest-neighbour fields against the exact ones.
+fn quality(ctx: &Ctx) -> String {
+    let target = pebbles(SIDE, SIDE, 11);
+    let source = Source::new(pebbles(SIDE, SIDE, 3), N, None).unwrap();
+    let width = SIDE - N + 1;
+    // Root of the mean squared difference per channel, in 8-bit units (a code is two of them).
+    let squared = |i: usize, pos: Pos| {
+        let at = (i / width) * SIDE + i % width;
+        f64::from(distance_squared(&target, at, &source.image, source.at(pos), N)) * 4.0
+    };
+    let chosen: Vec<usize> = samples(width * width, 500).collect();
+    let rms = |pos: &dyn Fn(usize) -> Pos| {
+        let sum: f64 = chosen.iter().map(|&i| squared(i, pos(i))).sum();
+        (sum / (chosen.len() * N * N * 3) as f64).sqrt()
+    };
+    let (seconds, exact) = timed(|| {
+        let at = |&i: &usize| exhaustive(ctx.simd, &target, &source, i / width, i % width);
+        chosen.iter().map(at).collect::<Vec<_>>()
+    });
+    let seconds = seconds * (width * width) as f64 / chosen.len() as f64;
+    let floor = rms(&|i| exact[chosen.iter().position(|&c| c == i).unwrap()]);
+    let mut table = format!(
+        "\n| nearest-neighbour field, 512 x 512, 11 x 11, one thread | rms error a channel (0..255) | CPU s |\n\
+         | --- | ---: | ---: |\n\
+         | exact, by trying all (error from 500 positions, time scaled up) | {floor:.2} | {seconds:.0} |\n"
+    );
+    for (passes, n_random) in [(2, 8), (3, 8), (5, 4), (5, 8), (10, 8)] {
+        let (seconds, field) = timed(|| nearest(ctx, &target, &source, passes, n_random).unwrap());
+        let error = rms(&|i| field.pos[i]);
+        assert!(error >= floor, "better than exact: {error} < {floor}");
+        let name = format!("{passes} passes, {n_random} random candidates");
+        writeln!(table, "| {name} | {error:.2} | {seconds:.2} |").unwrap();
+    }
+    table
+}

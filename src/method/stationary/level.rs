@@ -1,5 +1,6 @@
 //! The exemplar's pyramid in the matching space.
 
+use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
 use crate::image::color::{ColorModel, MatchSpace};
 use crate::image::mask::Mask;
@@ -25,11 +26,11 @@ const COARSEST: usize = 48;
 /// Window of the exemplar's typical histogram, as a fraction of its shorter side. Smaller than the
 /// texture's own features, it would call their colours untypical; larger than the stains' distances,
 /// it would see stains everywhere.
-const TYPICAL_WINDOW: f64 = 0.1;
+const TYPICAL_WINDOW: f64 = 0.2;
 
 /// Cost of using a patch as often as the average, as a share of the patch's own variance. More
 /// drives neighbouring pixels to different places of the photo, and the vote blurs.
-const USAGE_SHARE: f64 = 0.012;
+const USAGE_SHARE: f64 = 0.024;
 
 /// Affine map from L*a*b* to 7-bit codes, the same scale for all channels, so that distances of
 /// codes are Euclidean distances of colours.
@@ -100,11 +101,17 @@ pub(super) struct Level {
 ///
 /// # Errors
 /// [`Error::EmptyMask`] if no whole patch is usable at full size.
-pub(super) fn build(photo: &Picture, mask: Option<&Mask>, plan: &Plan) -> Result<Vec<Level>> {
+pub(super) fn build(
+    ctx: &Ctx,
+    photo: &Picture,
+    mask: Option<&Mask>,
+    plan: &Plan,
+) -> Result<Vec<Level>> {
     let (h, w) = plan.size;
     let (mut eh, mut ew) = (photo.height(), photo.width());
     let model = ColorModel::new(photo);
     let mut pixels = model.averaging_pixels(photo);
+    ctx.step(0)?;
     let mut usable = mask.map(|m| m.usable().to_vec());
     let n_usable = mask.map_or(eh * ew, Mask::count);
     let mut codes = None;
@@ -122,6 +129,7 @@ pub(super) fn build(photo: &Picture, mask: Option<&Mask>, plan: &Plan) -> Result
                 break;
             }
             pixels = resized(&pixels, (eh, ew), to);
+            ctx.step(0)?;
             usable = usable.map(|u| resized_mask(&u, (eh, ew), to));
             (eh, ew) = to;
         }

@@ -58,7 +58,7 @@ pub struct Plan {
 /// # Errors
 /// See [`tile`](crate::tile).
 pub fn run(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, plan: &Plan) -> Result<SourceMap> {
-    let levels = level::build(photo, mask, plan)?;
+    let levels = level::build(ctx, photo, mask, plan)?;
     let n_coarse = levels.len() - 1;
     let area = |l: &Level| (l.size.0 * l.size.1) as u64;
     let work = levels

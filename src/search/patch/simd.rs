@@ -47,10 +47,7 @@ pub(super) fn dispatch<W: WithKernel>(limit: Simd, patch: usize, work: W) -> W::
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
-    #[expect(
-        clippy::wildcard_imports,
-        reason = "two dozen intrinsics with names of their own"
-    )]
+    #[allow(clippy::wildcard_imports, reason = "two dozen intrinsics with names of their own")]
     use std::arch::x86_64::*;
 
     use super::super::{Kernel, MatchImage, PATCH_MAX, WithKernel};
