@@ -5,7 +5,6 @@
 //! top left corner of the patch of SOURCE that was found, as little-endian 16-bit numbers.
 
 #![expect(
-    missing_docs,
     clippy::print_stdout,
     clippy::unwrap_used,
     reason = "a program for one script, which sees its panics"

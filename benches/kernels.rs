@@ -291,7 +291,7 @@ fn projection(bench: &mut Bench) {
     let uneven =
         |pixels: &[Soft]| LocalDistributions::new(pixels, None, 0, domain, sigma).mean_distance();
     let mut even = pixels.clone();
-    project(&mut even, domain, sigma);
+    project(&mut even, domain, sigma, 1.0);
     let (before, after) = (uneven(&pixels), uneven(&even));
     assert!(after < 0.5 * before, "projected from {before} to {after} only");
     let mut group = bench.benchmark_group("projection 512x512");
@@ -299,7 +299,7 @@ fn projection(bench: &mut Bench) {
     group.bench_function("4 channels", |b| {
         b.iter_batched_ref(
             || pixels.clone(),
-            |pixels| project(pixels, domain, sigma),
+            |pixels| project(pixels, domain, sigma, 1.0),
             BatchSize::LargeInput,
         );
     });
@@ -349,6 +349,9 @@ fn settling(bench: &mut Bench, ctx: &Ctx) {
 // ---------------------------------------------------------------------------------------------
 // Tables
 
+/// Label, comparisons and work of one row of the table.
+type Row<'a> = (String, usize, Box<dyn Fn() + 'a>);
+
 /// Comparisons per second of everything, against the hot kernel's, measured in turns.
 fn limits(ctx: &Ctx) -> String {
     const TURNS: usize = 15;
@@ -362,18 +365,17 @@ fn limits(ctx: &Ctx) -> String {
         rate(hot.at.len() * 64, &|| {
             (0..64).for_each(|_| {
                 black_box(hot.sum(best));
-            })
+            });
         })
     };
     // What, comparisons, work.
-    type Row<'a> = (String, usize, Box<dyn Fn() + 'a>);
     let mut rows: Vec<Row<'_>> = Vec::new();
     for (name, dots) in ["random in 512x512", "random in 2048x2048"].iter().zip(&random) {
         let n = dots.at.len() * 32;
         let work = move || {
             (0..32).for_each(|_| {
                 black_box(dots.sum(best));
-            })
+            });
         };
         rows.push((format!("kernel, {name}"), n, Box::new(work)));
     }

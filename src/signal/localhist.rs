@@ -245,7 +245,8 @@ impl LocalDistributions {
 }
 
 /// Projects a picture onto textures whose local histograms are the same everywhere: each channel's
-/// value c becomes `G^-1(F_x(c))`, `F_x` the local distribution around its pixel, `G` the global one.
+/// value c moves by `share` (1: all the way) towards `G^-1(F_x(c))`, `F_x` the local distribution
+/// around its pixel, `G` the global one.
 ///
 /// # Paper
 /// Moritz et al. 2017, Sec. 4.3. A grid of cells replaces the paper's overlapping blocks; as there,
@@ -253,7 +254,7 @@ impl LocalDistributions {
 ///
 /// # Determinism
 /// Same bytes for any thread count.
-pub fn project(pixels: &mut [Soft], domain: Domain, sigma: f64) {
+pub fn project(pixels: &mut [Soft], domain: Domain, sigma: f64, share: f32) {
     for k in 0..4 {
         let first = pixels[0][k];
         if pixels.iter().all(|px| px[k] == first) {
@@ -278,7 +279,8 @@ pub fn project(pixels: &mut [Soft], domain: Domain, sigma: f64) {
                         let i = cell * (BINS + 1) + bin;
                         tables[i] + (tables[i + 1] - tables[i]) * at
                     };
-                    px[k] = rounded(value(x0) + (value(x1) - value(x0)) * fx);
+                    let even = value(x0) + (value(x1) - value(x0)) * fx;
+                    px[k] = rounded(px[k] as f32 + share * (even - px[k] as f32));
                 }
             },
         );
@@ -378,7 +380,7 @@ mod tests {
     fn projection_evens_out_and_keeps_the_global_histogram() {
         let mut px = picture(DOMAIN);
         let before = LocalDistributions::new(&px, None, 0, DOMAIN, 5.0);
-        project(&mut px, DOMAIN, 5.0);
+        project(&mut px, DOMAIN, 5.0, 1.0);
         let after = LocalDistributions::new(&px, None, 0, DOMAIN, 5.0);
         let (was, is) = (before.mean_distance(), after.mean_distance());
         assert!(is < 0.5 * was, "{was} -> {is}");
@@ -404,8 +406,8 @@ mod tests {
         };
         let (mut straight, mut shifted) = (px.clone(), rolled(&px));
         // Four and six cells.
-        project(&mut straight, DOMAIN, 12.5);
-        project(&mut shifted, DOMAIN, 12.5);
+        project(&mut straight, DOMAIN, 12.5, 1.0);
+        project(&mut shifted, DOMAIN, 12.5, 1.0);
         for (i, (got, want)) in shifted.iter().zip(rolled(&straight)).enumerate() {
             assert!(got[0].abs_diff(want[0]) < 8, "pixel {i}: {} != {}", got[0], want[0]);
         }

@@ -26,7 +26,7 @@ const COARSEST: usize = 48;
 /// Window of the exemplar's typical histogram, as a fraction of its shorter side. Smaller than the
 /// texture's own features, it would call their colours untypical; larger than the stains' distances,
 /// it would see stains everywhere.
-const TYPICAL_WINDOW: f64 = 0.2;
+const TYPICAL_WINDOW: f64 = 0.15;
 
 /// Cost of using a patch as often as the average, as a share of the patch's own variance. More
 /// drives neighbouring pixels to different places of the photo, and the vote blurs.

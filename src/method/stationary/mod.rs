@@ -30,6 +30,12 @@ const CONTRAST: usize = 3;
 /// concrete falls to half the photo's), and at 1 outliers come back.
 const CONTRAST_PULL: f32 = 0.5;
 
+/// Share of the projection at the levels between the coarsest (all of it) and the finest (none:
+/// there the photo's own pixels decide). The coarsest level has spread the stains already; all of it
+/// everywhere costs likeness (a texture cost 1.18 times wrap-only's on the gallery's stained photos
+/// instead of 1.1) for little more evenness (a stationarity cost of 0.25 instead of 0.32).
+const FINE_PROJECTION: f32 = 0.5;
+
 /// Sweeps of the seam placement; after three hardly a pixel moves.
 const SEAM_SWEEPS: u32 = 3;
 
@@ -81,11 +87,18 @@ pub fn run(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, plan: &Plan) -> Resu
             let mut votes = vote(ctx.simd, &f, &level.source, plan.wrap);
             let fade = 1.0 - (i + 1) as f32 / iterations as f32;
             match_global(&mut votes, level, if coarsest { fade } else { 0.0 });
-            if let Some(sigma) = plan.sigma {
+            let projection = if coarsest {
+                1.0
+            } else if level.size == plan.size {
+                0.0
+            } else {
+                FINE_PROJECTION
+            };
+            if let Some(sigma) = plan.sigma.filter(|_| projection > 0.0) {
                 let (height, width) = (votes.height, votes.width);
                 let domain = Domain { height, width, wrap_y: plan.wrap.y, wrap_x: plan.wrap.x };
                 let sigma = sigma as f64 * h.min(w) as f64;
-                localhist::project(&mut votes.soft, domain, sigma);
+                localhist::project(&mut votes.soft, domain, sigma, projection);
             }
             let target = canvas(&votes, plan, (h, w));
             let now = Usage::of(&f, &level.source, plan.uniformity * level.usage_unit);
