@@ -82,8 +82,9 @@ impl Dots {
     fn hot() -> Self {
         let image = noise_codes(24, 24);
         let side = 24 - N + 1;
-        let all = (0..side * side).map(|i| ((i / side) * 24 + i % side) as u32);
-        Self { image, at: all.cycle().take(1 << 14).collect() }
+        let all: Vec<u32> = (0..side * side).map(|i| image.at(i / side, i % side) as u32).collect();
+        let at = all.iter().copied().cycle().take(1 << 14).collect();
+        Self { image, at }
     }
 
     /// Random positions.
@@ -92,9 +93,10 @@ impl Dots {
         let place = |i| {
             let mut rng = Rng::new(2, 0, 0, i);
             let n = (side - N + 1) as u32;
-            rng.below(n) * side as u32 + rng.below(n)
+            image.at(rng.below(n) as usize, rng.below(n) as usize) as u32
         };
-        Self { image, at: (0..1 << 14).map(place).collect() }
+        let at = (0..1 << 14).map(place).collect();
+        Self { image, at }
     }
 
     fn sum(&self, simd: Simd) -> i64 {
@@ -410,7 +412,7 @@ fn quality(ctx: &Ctx) -> String {
     let width = SIDE - N + 1;
     // Root of the mean squared difference per channel, in 8-bit units (a code is two of them).
     let squared = |i: usize, pos: Pos| {
-        let at = (i / width) * SIDE + i % width;
+        let at = target.at(i / width, i % width);
         f64::from(distance_squared(&target, at, &source.image, source.at(pos), N)) * 4.0
     };
     let chosen: Vec<usize> = samples(width * width, 500).collect();

@@ -185,7 +185,7 @@ pub(crate) fn exhaustive(
             best.1
         }
     }
-    with_kernel(simd, source.patch, Exhaustive(target, source, y * target.width() + x))
+    with_kernel(simd, source.patch, Exhaustive(target, source, target.at(y, x)))
 }
 
 /// Positions spread evenly over a field (pixel indices into it).

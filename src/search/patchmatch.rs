@@ -220,7 +220,7 @@ impl Band<'_> {
             let mut beside = self.wrap.x.then(|| row[end]);
             for step in 0..width {
                 let x = if backward { width - 1 - step } else { step };
-                kernel.hold(&mut query, self.target, y * self.target.width() + x);
+                kernel.hold(&mut query, self.target, self.target.at(y, x));
                 let own = row[x];
                 candidates[0] = own;
                 let mut n = 1;
@@ -309,7 +309,7 @@ pub fn distances(simd: Simd, target: &MatchImage, source: &Source, field: &Field
             let mut query = kernel.query();
             (0..field.width)
                 .map(|x| {
-                    let at = y * target.width() + x;
+                    let at = target.at(y, x);
                     kernel.hold(&mut query, target, at);
                     let pos = field.pos[y * field.width + x];
                     let own = kernel.dot(&query, target, at);

@@ -31,7 +31,7 @@ impl Source {
             return None;
         }
         let mut bias = box_sums(h, w, patch, |y, row| {
-            let codes = &image.codes()[y * w * 4..(y + 1) * w * 4];
+            let codes = image.row(y);
             for (sum, px) in row.iter_mut().zip(codes.chunks_exact(4)) {
                 *sum = px.iter().map(|&c| c as i32 * c as i32).sum();
             }
@@ -84,7 +84,7 @@ impl Source {
     /// Pixel index of the top left corner of the patch at `pos`.
     #[inline]
     pub fn at(&self, pos: Pos) -> usize {
-        pos.y() * self.image.width() + pos.x()
+        self.image.at(pos.y(), pos.x())
     }
 
     /// A usable position, uniform in the random number.

@@ -80,7 +80,6 @@ impl WithKernel for VoteRow<'_> {
         let Self { runs, source, wrap, y, row, out } = self;
         let n = source.patch;
         let height = runs.len() as isize;
-        let codes = source.image.codes();
         row.fill(0);
         let mut n_rows = 0;
         for d in 0..n {
@@ -92,9 +91,14 @@ impl WithKernel for VoteRow<'_> {
             }
             n_rows += 1;
             for run in &runs[anchor as usize] {
-                let at = (run.at + d * source.image.width()) * 4;
+                let at = run.at + d * source.image.stride();
                 let len = 4 * (run.len + n - 1);
-                add_run(&codes[at..at + len], &mut row[4 * run.x..4 * run.x + len], run.len, n);
+                add_run(
+                    source.image.codes_from(at, len),
+                    &mut row[4 * run.x..4 * run.x + len],
+                    run.len,
+                    n,
+                );
             }
         }
         let half = n / 2;

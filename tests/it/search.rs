@@ -76,7 +76,7 @@ mod kernels {
 
     fn naive(a: &MatchImage, a_at: usize, b: &MatchImage, b_at: usize, n: usize) -> i32 {
         let px = |m: &MatchImage, at: usize, y: usize, x: usize| {
-            m.pixel(at / m.width() + y, at % m.width() + x)
+            m.pixel(at / m.stride() + y, at % m.stride() + x)
         };
         let mut sum = 0;
         for y in 0..n {
@@ -98,10 +98,10 @@ mod kernels {
                 let mut rng = Rng::new(0, 2, n as u32, more_x as u64);
                 let mut place = |m: &MatchImage, i: usize| match i {
                     0 => 0,
-                    1 => (m.height() - n) * m.width() + m.width() - n,
+                    1 => m.at(m.height() - n, m.width() - n),
                     _ => {
                         let y = rng.below((m.height() - n + 1) as u32) as usize;
-                        y * m.width() + rng.below((m.width() - n + 1) as u32) as usize
+                        m.at(y, rng.below((m.width() - n + 1) as u32) as usize)
                     }
                 };
                 let pairs: Vec<_> = (0..12).map(|i| (place(&a, i), place(&b, i))).collect();
@@ -223,7 +223,7 @@ mod fields {
     /// Brute force: the least squared distance of every output patch.
     fn exact(target: &MatchImage, source: &Source, h: usize, w: usize) -> Vec<i32> {
         let nearest = |i: usize| {
-            let at = i / w * target.width() + i % w;
+            let at = target.at(i / w, i % w);
             let distance = |j: usize| {
                 let pos = Pos::new(j / source.cols(), j % source.cols());
                 distance_squared(target, at, &source.image, source.at(pos), source.patch)
@@ -264,7 +264,7 @@ mod fields {
             let target = random_image(h + patch - 1, w + patch - 1, 5);
             let field = random_field(h, w, &source, 6);
             let naive = |i: usize| {
-                let at = i / w * target.width() + i % w;
+                let at = target.at(i / w, i % w);
                 distance_squared(&target, at, &source.image, source.at(field.pos[i]), patch)
             };
             let want: Vec<_> = (0..h * w).map(naive).collect();

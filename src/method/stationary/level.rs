@@ -185,7 +185,7 @@ fn level(
     let usable_pixel = |i: &usize| usable.is_none_or(|u| u[*i]);
     let masses: [Vec<f64>; 4] = std::array::from_fn(|k| {
         let mut masses = vec![0.0; CODE_MAX as usize + 1];
-        let code = |i: usize| source.image.codes()[4 * i + k] as usize;
+        let code = |i: usize| source.image.pixel(i / ew, i % ew)[k] as usize;
         // An odd step visits every column of a picture of even width.
         let step = (eh * ew / 400_000) | 1;
         (0..eh * ew).step_by(step).filter(usable_pixel).for_each(|i| masses[code(i)] += 1.0);
@@ -195,7 +195,7 @@ fn level(
     let distribution = |k: usize| {
         Distribution::from_masses(&masses[k]).unwrap_or_else(|| {
             let some = (0..eh * ew).find(usable_pixel).unwrap_or(0);
-            let code = source.image.codes()[4 * some + k];
+            let code = source.image.pixel(some / ew, some % ew)[k];
             Distribution::of(std::iter::once((code as u16) << SOFT_BITS)).expect("one value")
         })
     };
@@ -247,7 +247,7 @@ fn with_contrast(colors: &MatchImage) -> MatchImage {
         // Per column: sums of the three colours, and of all their squares.
         let mut columns = vec![[0u32; 4]; w];
         for y in rows {
-            let codes = &colors.codes()[4 * y * w..4 * (y + 1) * w];
+            let codes = colors.row(y);
             for (sum, px) in columns.iter_mut().zip(codes.chunks_exact(4)) {
                 let [a, b, c] = [px[0] as u32, px[1] as u32, px[2] as u32];
                 sum[0] += a;
@@ -256,7 +256,7 @@ fn with_contrast(colors: &MatchImage) -> MatchImage {
                 sum[3] += a * a + b * b + c * c;
             }
         }
-        let codes = &colors.codes()[4 * y * w..4 * (y + 1) * w];
+        let codes = colors.row(y);
         for (x, (out, px)) in row.iter_mut().zip(codes.chunks_exact(4)).enumerate() {
             let cols = &columns[x.saturating_sub(REACH)..(x + REACH + 1).min(w)];
             let mut sum = [0u32; 4];

@@ -27,13 +27,18 @@ pub const PATCH_MAX: usize = 21;
 pub struct MatchImage {
     height: usize,
     width: usize,
+    stride: usize,
     codes: Vec<u8>,
 }
 
 impl MatchImage {
     /// A picture of zeros.
     pub fn new(height: usize, width: usize) -> Self {
-        Self { height, width, codes: vec![0; height * width * 4 + TAIL] }
+        // An odd number of cache lines a row. With the even numbers that pictures of 512 or 1024
+        // columns have, all rows of a patch would fall into the same few sets of the cache.
+        const LINE: usize = 16;
+        let stride = (width.div_ceil(LINE) | 1) * LINE;
+        Self { height, width, stride, codes: vec![0; height * stride * 4 + TAIL] }
     }
 
     /// Height in pixels.
@@ -46,26 +51,43 @@ impl MatchImage {
         self.width
     }
 
+    /// Pixels from one row to the next.
+    pub fn stride(&self) -> usize {
+        self.stride
+    }
+
+    /// Index of pixel (`y`, `x`).
+    #[inline]
+    pub fn at(&self, y: usize, x: usize) -> usize {
+        y * self.stride + x
+    }
+
     /// The codes of pixel (`y`, `x`).
     #[inline]
     pub fn pixel(&self, y: usize, x: usize) -> [u8; 4] {
-        let at = (y * self.width + x) * 4;
+        let at = self.at(y, x) * 4;
         [self.codes[at], self.codes[at + 1], self.codes[at + 2], self.codes[at + 3]]
     }
 
-    /// All codes without the tail, row by row.
+    /// The codes of row `y`, four a pixel.
     #[inline]
-    pub fn codes(&self) -> &[u8] {
-        &self.codes[..self.height * self.width * 4]
+    pub fn row(&self, y: usize) -> &[u8] {
+        &self.codes[self.at(y, 0) * 4..][..self.width * 4]
+    }
+
+    /// `n` codes from pixel index `at` on, in one row.
+    #[inline]
+    pub(crate) fn codes_from(&self, at: usize, n: usize) -> &[u8] {
+        &self.codes[at * 4..at * 4 + n]
     }
 
     /// Writes rows of pixels through `fill(y, row)`; codes above 127 are cut to 127.
     pub fn fill_rows(&mut self, fill: impl Fn(usize, &mut [[u8; 4]]) + Sync) {
         use rayon::prelude::*;
-        let n = self.height * self.width * 4;
-        let (width, codes) = (self.width, &mut self.codes[..n]);
-        codes.par_chunks_mut(width * 4).enumerate().for_each(|(y, row)| {
-            let row: &mut [[u8; 4]] = bytemuck::cast_slice_mut(row);
+        let (width, stride) = (self.width, self.stride);
+        let rows = self.codes.par_chunks_mut(stride * 4).take(self.height);
+        rows.enumerate().for_each(|(y, row)| {
+            let row: &mut [[u8; 4]] = bytemuck::cast_slice_mut(&mut row[..width * 4]);
             fill(y, row);
             for code in row.as_flattened_mut() {
                 *code = (*code).min(CODE_MAX);

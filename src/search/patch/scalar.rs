@@ -19,7 +19,7 @@ impl Kernel for Scalar {
     fn hold(&self, query: &mut Vec<u8>, image: &MatchImage, at: usize) {
         let n = self.patch;
         for (row, held) in query.chunks_exact_mut(4 * n).enumerate() {
-            let start = (at + row * image.width) * 4;
+            let start = (at + row * image.stride) * 4;
             held.copy_from_slice(&image.codes[start..start + 4 * n]);
         }
     }
@@ -29,7 +29,7 @@ impl Kernel for Scalar {
         let n = self.patch;
         let mut sum = 0;
         for (row, held) in query.chunks_exact(4 * n).enumerate() {
-            let start = (at + row * image.width) * 4;
+            let start = (at + row * image.stride) * 4;
             let other = &image.codes[start..start + 4 * n];
             sum += held.iter().zip(other).map(|(&a, &b)| a as i32 * b as i32).sum::<i32>();
         }
@@ -49,8 +49,8 @@ pub fn distance_squared(
     let mut sum = 0;
     for row in 0..patch {
         for i in 0..4 * patch {
-            let u = a.codes[(a_at + row * a.width) * 4 + i] as i32;
-            let v = b.codes[(b_at + row * b.width) * 4 + i] as i32;
+            let u = a.codes[(a_at + row * a.stride) * 4 + i] as i32;
+            let v = b.codes[(b_at + row * b.stride) * 4 + i] as i32;
             sum += (u - v) * (u - v);
         }
     }

@@ -57,7 +57,7 @@ mod x86 {
     /// read; returns a pointer to its first pixel.
     #[inline(always)]
     fn checked(image: &MatchImage, at: usize, patch: usize) -> *const u8 {
-        let end = (at + (patch - 1) * image.width + patch) * 4;
+        let end = (at + (patch - 1) * image.stride + patch) * 4;
         assert!(end + TAIL <= image.codes.len(), "patch outside its picture");
         // SAFETY: `at * 4 <= end`, which lies inside the allocation by the line above.
         unsafe { image.codes.as_ptr().add(at * 4) }
@@ -117,7 +117,7 @@ mod x86 {
                 // SAFETY: inside the picture by `checked`; features as above. The mask cuts the
                 // row at its eleventh pixel, so that longer reads of the other side do no harm.
                 *held = unsafe {
-                    _mm512_maskz_loadu_epi32(0x7ff, start.add(row * image.width * 4).cast())
+                    _mm512_maskz_loadu_epi32(0x7ff, start.add(row * image.stride * 4).cast())
                 };
             }
         }
@@ -125,7 +125,7 @@ mod x86 {
         #[inline(always)]
         fn dot(&self, query: &[__m512i; 11], image: &MatchImage, at: usize) -> i32 {
             let start = checked(image, at, 11);
-            let stride = image.width * 4;
+            let stride = image.stride * 4;
             // SAFETY: inside the picture, or its tail, by `checked`; features as above.
             unsafe {
                 // Two sums, so that no multiply-add waits for the one before it.
@@ -162,7 +162,7 @@ mod x86 {
             for (row, held) in query[..self.patch].iter_mut().enumerate() {
                 // SAFETY: inside the picture, or its tail, by `checked`; features as above.
                 *held = unsafe {
-                    let row = start.add(row * image.width * 4);
+                    let row = start.add(row * image.stride * 4);
                     [
                         _mm512_maskz_loadu_epi32(mask as u16, row.cast()),
                         _mm512_maskz_loadu_epi32((mask >> 16) as u16, row.add(64).cast()),
@@ -174,7 +174,7 @@ mod x86 {
         #[inline(always)]
         fn dot(&self, query: &Self::Query, image: &MatchImage, at: usize) -> i32 {
             let start = checked(image, at, self.patch);
-            let stride = image.width * 4;
+            let stride = image.stride * 4;
             // SAFETY: inside the picture, or its tail, by `checked`; features as above.
             unsafe {
                 let mut sums = [_mm512_setzero_si512(); 2];
@@ -226,7 +226,7 @@ mod x86 {
                     *held = unsafe {
                         let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
                         let mask = _mm256_cmpgt_epi32(_mm256_set1_epi32(inside), lanes);
-                        let at = start.add(row * image.width * 4 + 32 * i);
+                        let at = start.add(row * image.stride * 4 + 32 * i);
                         _mm256_and_si256(_mm256_loadu_si256(at.cast()), mask)
                     };
                 }
@@ -237,7 +237,7 @@ mod x86 {
         fn dot(&self, query: &Self::Query, image: &MatchImage, at: usize) -> i32 {
             let n = self.side();
             let start = checked(image, at, n);
-            let stride = image.width * 4;
+            let stride = image.stride * 4;
             // SAFETY: inside the picture, or its tail, by `checked`; feature as above.
             unsafe {
                 let one = _mm256_set1_epi16(1);
