@@ -128,11 +128,12 @@ pub fn run(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, plan: &Plan) -> Resu
 /// Peak memory of [`run`] besides the photo itself, for a photo and an output of these sizes
 /// (height, width), in bytes; generous by a quarter.
 pub fn memory_bytes(photo: (usize, usize), output: (usize, usize)) -> u64 {
-    // Per photo pixel: linear light and L*a*b* in floats (12 + 16 + 16), contrast 4, and the
-    // pyramid's codes and norms, 8 bytes times 1 / (1 - 1.3^-2).
-    const PHOTO: u64 = 76;
-    // Per output pixel: two fields 8, votes 8, L*a*b* 16, canvas 4, source map and sweeps 32.
-    const OUTPUT: u64 = 80;
+    // Per photo pixel: linear light of this level and the next (12 + 7), codes with and without
+    // contrast (8), sums of squares and norms of all levels (4 + 8 * 2.45 / 2).
+    const PHOTO: u64 = 44;
+    // Per output pixel: two fields (8), votes (8), canvas (4), three source maps (24), or the costs'
+    // colours (20).
+    const OUTPUT: u64 = 48;
     let pixels = |(h, w): (usize, usize)| h as u64 * w as u64;
     (PHOTO * pixels(photo) + OUTPUT * pixels(output)) / 4 * 5
 }
