@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use crate::base::error::{Error, Result};
+use crate::base::error::{Error, Result, guarded};
 
 /// Progress and cancel flag of one run, shared between the worker and whoever waits for it.
 #[derive(Debug, Default)]
@@ -95,16 +95,7 @@ impl Ctx {
     /// # Errors
     /// Those of `f`, or [`Error::Internal`].
     pub fn install<T: Send>(&self, f: impl FnOnce() -> Result<T> + Send) -> Result<T> {
-        self.pool.install(|| {
-            std::panic::catch_unwind(std::panic::AssertUnwindSafe(f)).unwrap_or_else(|panic| {
-                let message = panic
-                    .downcast_ref::<String>()
-                    .cloned()
-                    .or_else(|| panic.downcast_ref::<&str>().map(ToString::to_string))
-                    .unwrap_or_else(|| "panic without a message".into());
-                Err(Error::Internal { message })
-            })
-        })
+        self.pool.install(|| guarded(f))
     }
 
     /// Announces the amount of work (any unit); resets the progress.

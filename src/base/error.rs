@@ -258,3 +258,15 @@ impl Error {
         move |source| Self::Io { action, path, source }
     }
 }
+
+/// Runs `work`; a panic inside (a bug of ours) comes back as [`Error::Internal`].
+pub(crate) fn guarded<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
+    std::panic::catch_unwind(std::panic::AssertUnwindSafe(work)).unwrap_or_else(|panic| {
+        let message = panic
+            .downcast_ref::<String>()
+            .cloned()
+            .or_else(|| panic.downcast_ref::<&str>().map(ToString::to_string))
+            .unwrap_or_else(|| "panic without a message".into());
+        Err(Error::Internal { message })
+    })
+}

@@ -1,6 +1,5 @@
 //! The doorway: everything that takes time goes through [`enter`].
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
 use std::time::Duration;
@@ -9,7 +8,7 @@ use pyo3::prelude::*;
 
 use super::error::IntoPy;
 use crate::base::ctx::Job;
-use crate::base::error::{Error, Result};
+use crate::base::error::{Error, Result, guarded};
 
 /// How often the waiting thread looks up. Longer makes Ctrl-C and progress bars sluggish, much
 /// shorter takes the interpreter from its other threads.
@@ -70,17 +69,6 @@ pub(super) fn unheard<T: Send + 'static>(
     work: impl FnOnce() -> Result<T> + Send + 'static,
 ) -> PyResult<T> {
     enter(py, &Arc::default(), None, work)
-}
-
-fn guarded<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
-    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
-        let message = panic
-            .downcast_ref::<String>()
-            .cloned()
-            .or_else(|| panic.downcast_ref::<&str>().map(ToString::to_string))
-            .unwrap_or_else(|| "panic without a message".into());
-        Err(Error::Internal { message })
-    })
 }
 
 /// The caller's callback and what it was last told.

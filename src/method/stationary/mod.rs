@@ -26,14 +26,13 @@ use level::Level;
 const CONTRAST: usize = 3;
 
 /// Share by which the contrast is pulled back to the exemplar's in every iteration. Averaging votes
-/// drift towards smooth places; without this pull fine detail dies out (sharpness of the gallery's
-/// concrete falls to half the photo's), and at 1 outliers come back.
+/// drift towards smooth places; without this pull fine detail dies out (compare plain concrete in the
+/// gallery with the pull at 0).
 const CONTRAST_PULL: f32 = 0.5;
 
 /// Share of the projection at the levels between the coarsest (all of it) and the finest (none:
-/// there the photo's own pixels decide). The coarsest level has spread the stains already. On the
-/// stained exemplars, more costs likeness (1: texture cost 1.18 times wrap-only's, stationarity cost
-/// 0.25 times) and less leaves patches of shade that show when tiled (0.5: 1.1 and 0.32 times).
+/// there the photo's own pixels decide). The coarsest level has spread the stains already; more costs
+/// likeness (a higher texture cost), less leaves patches of shade that show when tiled.
 const FINE_PROJECTION: f32 = 0.75;
 
 /// Sweeps of the seam placement; after three hardly a pixel moves.

@@ -2,7 +2,7 @@
 
 use super::{Kernel, MatchImage};
 
-/// Plain Rust; `N` is the patch side.
+/// Plain Rust, for any patch side.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Scalar {
     pub(super) patch: usize,

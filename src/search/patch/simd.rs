@@ -1,8 +1,8 @@
 //! The kernels for x86-64, chosen at run time. The only file with `unsafe` code.
 //!
 //! Why not a safe wrapper crate: the hot load is an unaligned one at a computed offset, 11 of them
-//! per comparison; one range check per comparison instead of one per load is worth a third of the
-//! speed. The check is in `checked`.
+//! per comparison, and the hottest loop there is. So one range check per comparison replaces one per
+//! load; it is in `checked`.
 
 #![expect(unsafe_code, reason = "SIMD loads at computed offsets; each use has a SAFETY comment")]
 
