@@ -41,6 +41,7 @@ def tile(
     axis: Axis = "both",
     method: Method = "stationary",
     measure: Measure = "histogram",
+    order: int = 2,
     sigma: float = 0.1,
     patch: int = 11,
     uniformity: float = 1.0,
@@ -70,8 +71,13 @@ def tile(
         In which directions the tile repeats: ``"x"`` horizontally only, ``"y"`` vertically only.
     method : {"stationary", "wrap-only", "no-wrap", "make-seamless"}
         How the tile is made. All but the first are baselines to compare with.
-    measure : {"histogram", "none"}
-        The statistic that is made equal everywhere in the tile.
+    measure : {"histogram", "moments", "steerable", "none"}
+        The statistic that is made equal everywhere in the tile: the histograms of the colours,
+        their moments, or the histograms of the responses to filters of four orientations, which
+        know fine structure but no shades.
+    order : int
+        With the measure ``"moments"``, how many of them, 1 to 4: the mean, the variance, the
+        skewness, the kurtosis.
     sigma : float
         Reach of the measure, as a fraction of the tile's shorter side, 0.01 to 1. Smaller evens
         out smaller stains, larger keeps more variety.
@@ -149,6 +155,7 @@ def tile(
         "axis": _word("axis", axis),
         "method": _word("method", method),
         "measure": _word("measure", measure),
+        "order": str(_arrays.integer("order", order)),
         "sigma": _number("sigma", sigma),
         "patch": str(_arrays.integer("patch", patch)),
         "uniformity": _number("uniformity", uniformity),

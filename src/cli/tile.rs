@@ -10,6 +10,7 @@ use serde::{Serialize, Serializer};
 
 use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
+use crate::base::params::Value;
 use crate::cli::maps::{self, Wanted};
 use crate::cli::output::{Target, to_stdout};
 use crate::cli::show::duration;
@@ -19,7 +20,7 @@ use crate::cli::{args, files, preview};
 use crate::image::mask::Mask;
 use crate::image::material::{MapKind, Sibling};
 use crate::image::picture::Picture;
-use crate::verb::tile::{Costs, Method, Report, Size, Tile, TileParams, tile};
+use crate::verb::tile::{Costs, Measure, Method, Report, Size, Tile, TileParams, tile};
 
 /// What was typed, checked as far as it can be without looking at a file.
 #[derive(Debug)]
@@ -392,10 +393,14 @@ fn line(request: &Request, report: &Report, elapsed: Duration) -> String {
         Target::Stdout => "standard output".into(),
         Target::File(path) => path.display().to_string(),
     };
-    let Costs { texture, stationarity } = report.costs;
+    let Costs { texture, stationarity, stationarity_by_measure } = report.costs;
     let texture = texture.map_or(String::new(), |cost| format!("texture cost {cost:.2}, "));
+    let measure = request.params.measure;
+    let by_measure = stationarity_by_measure
+        .filter(|_| measure != Measure::Histogram)
+        .map_or(String::new(), |cost| format!(" (by {}: {cost:.3})", measure.show()));
     format!(
-        "{place}  {w}x{h}{why}, seed {}, {}, {texture}stationarity cost {stationarity:.2}",
+        "{place}  {w}x{h}{why}, seed {}, {}, {texture}stationarity cost {stationarity:.2}{by_measure}",
         report.seed,
         duration(elapsed),
     )

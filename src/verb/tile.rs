@@ -16,7 +16,8 @@ use crate::image::picture::Picture;
 use crate::image::sourcemap::SourceMap;
 use crate::method::{make_seamless, stationary};
 use crate::search::patchmatch::Wrap;
-use crate::signal::localhist::Domain;
+use crate::signal::measure::{ORDERS, Statistic};
+use crate::signal::window::{Domain, Window};
 
 /// Longest side of a tile, in pixels.
 const MAX_TILE_SIDE: usize = 32_768;
@@ -89,8 +90,12 @@ choice! {
 choice! {
     /// The statistic that is made equal everywhere.
     pub enum Measure {
-        /// Local histograms of each colour channel.
+        /// Local histograms of each colour channel: the whole distribution.
         Histogram = "histogram",
+        /// Local moments of each colour channel: mean, variance and so on, up to `order`.
+        Moments = "moments",
+        /// Local histograms of oriented filters' responses: only fine structure, no shades.
+        Steerable = "steerable",
         /// None: the same as the method `wrap-only`.
         None = "none",
     }
@@ -119,6 +124,8 @@ params! {
         method: Method = Method::Stationary;
         /// The statistic that is made equal everywhere in the tile.
         measure: Measure = Measure::Histogram;
+        /// With the measure moments, how many of them: 1 the mean, 2 and the variance, 3 and the skewness, 4 and the kurtosis.
+        order: usize = 2, in 1..=4;
         /// Reach of the stationarity measure: smaller evens out smaller stains, larger keeps more variety.
         sigma: f32 = 0.1, in 0.01..=1.0, unit "fraction of the tile's shorter side";
         /// Side of the patches that are compared; odd. Larger keeps larger features whole, smaller mixes more.
@@ -141,6 +148,12 @@ pub struct Costs {
     /// Stationarity cost: mean earth mover's distance between the local histograms of two places,
     /// summed over L*, a* and b* (paper eq. 1 and 3), in L*a*b* units.
     pub stationarity: f64,
+    /// The cost under the measure of the parameters: the same number for the histogram; for the
+    /// moments, the mean squared difference of two places' moments of normalized values, in L*a*b*
+    /// units squared (paper eq. 2); for the steerable filters, the earth mover's distance summed
+    /// over twelve responses, in L*a*b* units (paper eq. 4). `None` without a measure. Comparable
+    /// between tiles of the same measure and order only.
+    pub stationarity_by_measure: Option<f64>,
 }
 
 /// How a tile was made and what it costs.
@@ -192,6 +205,16 @@ impl TileParams {
             return (pow2(w), pow2(h));
         }
         (pow2(w.min(h)), pow2(w.min(h)))
+    }
+
+    /// What `measure` and `order` say.
+    fn statistic(&self) -> Option<Statistic> {
+        match self.measure {
+            Measure::Histogram => Some(Statistic::Histogram),
+            Measure::Moments => Some(Statistic::Moments(ORDERS[self.order - 1])),
+            Measure::Steerable => Some(Statistic::Steerable),
+            Measure::None => None,
+        }
     }
 }
 
@@ -257,6 +280,10 @@ fn check(photo: &Picture, params: &TileParams) -> Result<(usize, usize)> {
     if params.patch.is_multiple_of(2) {
         return Err(Error::parameter("patch", "odd, so that a patch has a middle", params.patch));
     }
+    if params.measure != Measure::Moments && params.order != TileParams::default().order {
+        let expected = "left out unless the measure is `moments`";
+        return Err(Error::parameter("order", expected, params.order));
+    }
     let (width, height) = params.resolved_size(photo.width(), photo.height());
     let sides = 1..=MAX_TILE_SIDE;
     if !sides.contains(&width) || !sides.contains(&height) {
@@ -307,17 +334,18 @@ fn usable_mask(photo: &Picture, mask: Option<&Mask>) -> Result<Option<Mask>> {
 }
 
 fn plan(params: &TileParams, size: (usize, usize), wrap: Wrap) -> stationary::Plan {
-    let even = params.method == Method::Stationary && params.measure != Measure::None;
+    let even = params.method == Method::Stationary;
     let wraps = params.method != Method::NoWrap;
     let (coarse_iterations, fine_iterations) = match params.quality {
         Quality::Draft => (12, 1),
         Quality::Normal => (30, 2),
         Quality::Best => (60, 6),
     };
+    let evenness = |statistic| stationary::Evenness { statistic, sigma: params.sigma };
     stationary::Plan {
         size,
         wrap: Wrap { y: wrap.y && wraps, x: wrap.x && wraps },
-        sigma: even.then_some(params.sigma),
+        evenness: params.statistic().filter(|_| even).map(evenness),
         patch: params.patch,
         uniformity: params.uniformity,
         coarse_iterations,
@@ -338,8 +366,14 @@ fn costs(
     let (height, width) = (picture.height(), picture.width());
     let domain = Domain { height, width, wrap_y: wrap.y, wrap_x: wrap.x };
     let sigma = f64::from(params.sigma) * height.min(width) as f64;
+    let stationarity = stationarity::histogram_cost(&pixels, domain, sigma);
+    let by_measure = |statistic| match statistic {
+        Statistic::Histogram => stationarity,
+        other => other.cost(&pixels, domain, &Window::even(sigma)),
+    };
     Costs {
         texture: map.map(|map| texture::cost_bound(picture, photo, map, params.patch, wrap)),
-        stationarity: stationarity::histogram_cost(&pixels, domain, sigma),
+        stationarity,
+        stationarity_by_measure: params.statistic().map(by_measure),
     }
 }

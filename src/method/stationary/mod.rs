@@ -18,7 +18,8 @@ use crate::search::patchmatch::{self, Search, Usage, Wrap};
 use crate::search::seams;
 use crate::search::vote::{Votes, vote};
 use crate::signal::histogram::{Distribution, SOFT_BITS};
-use crate::signal::localhist::{self, Domain};
+use crate::signal::measure::Statistic;
+use crate::signal::window::{Domain, Window};
 
 use level::Level;
 
@@ -45,9 +46,8 @@ pub struct Plan {
     pub size: (usize, usize),
     /// Which axes wrap.
     pub wrap: Wrap,
-    /// Standard deviation of the stationarity window as a fraction of the shorter side; `None`
-    /// leaves the projection out.
-    pub sigma: Option<f32>,
+    /// What is made equal everywhere; `None` leaves the projection out.
+    pub evenness: Option<Evenness>,
     /// Patch side.
     pub patch: usize,
     /// Weight of spatial uniformity.
@@ -56,6 +56,22 @@ pub struct Plan {
     pub coarse_iterations: u32,
     /// Iterations at each other level.
     pub fine_iterations: u32,
+}
+
+/// What is made equal everywhere, and within which reach.
+#[derive(Debug, Clone)]
+pub struct Evenness {
+    /// The statistic.
+    pub statistic: Statistic,
+    /// Standard deviation of its window as a fraction of the output's shorter side.
+    pub sigma: f32,
+}
+
+impl Evenness {
+    /// The window at a level of this size.
+    fn window(&self, (height, width): (usize, usize)) -> Window {
+        Window::even(f64::from(self.sigma) * height.min(width) as f64)
+    }
 }
 
 /// Synthesizes a texture from `photo`: where every output pixel comes from.
@@ -93,11 +109,11 @@ pub fn run(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, plan: &Plan) -> Resu
             } else {
                 FINE_PROJECTION
             };
-            if let Some(sigma) = plan.sigma.filter(|_| projection > 0.0) {
+            if let Some(evenness) = plan.evenness.as_ref().filter(|_| projection > 0.0) {
                 let (height, width) = (votes.height, votes.width);
                 let domain = Domain { height, width, wrap_y: plan.wrap.y, wrap_x: plan.wrap.x };
-                let sigma = sigma as f64 * h.min(w) as f64;
-                localhist::project(&mut votes.soft, domain, sigma, projection);
+                let window = evenness.window((h, w));
+                evenness.statistic.project(&mut votes.soft, domain, &window, projection);
             }
             let target = canvas(&votes, plan, (h, w));
             let now = Usage::of(&f, &level.source, plan.uniformity * level.usage_unit);
