@@ -116,9 +116,9 @@ class Costs:
     stationarity_by_measure : float or None
         The cost under the measure that the tile was made with. ``"histogram"``: as
         `stationarity`. ``"moments"``: mean squared difference of two places' moments (of values
-        normalized to mean 0 and variance 1, scaled back by the variance), in CIE L*a*b* units
-        squared. ``"steerable"``: mean earth mover's distance summed over twelve responses. To be
-        compared between tiles of the same measure and order only. None for ``"none"``.
+        counted from the mean in tens of units), in CIE L*a*b* units squared. ``"steerable"``: mean
+        earth mover's distance, summed over twelve responses. To be compared between tiles of
+        the same measure and order only. None for ``"none"``.
     """
 
     texture: float | None

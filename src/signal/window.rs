@@ -3,7 +3,7 @@
 //! What is summed under the window of every pixel is summed on a grid: spread into cells with a tent,
 //! blurred separably, interpolated. Linear in the pixels and independent of the window's size.
 
-use std::ops::{AddAssign, Mul};
+use std::ops::{Add, AddAssign, Mul, Sub};
 
 use rayon::prelude::*;
 
@@ -167,7 +167,15 @@ impl std::fmt::Debug for Grid {
 
 /// A number that is summed under the window.
 pub trait Summed:
-    Copy + Default + Send + Sync + AddAssign + Mul<Output = Self> + From<f32>
+    Copy
+    + Default
+    + Send
+    + Sync
+    + From<f32>
+    + AddAssign
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
 {
 }
 impl Summed for f32 {}
@@ -240,9 +248,10 @@ impl Grid {
 
     /// Interpolates between the four cells around (`y`, `x`).
     #[inline]
-    pub fn between(&self, y: usize, x: usize, cell: impl Fn(usize) -> f32) -> f32 {
+    pub fn between<T: Summed>(&self, y: usize, x: usize, cell: impl Fn(usize) -> T) -> T {
         let (y0, y1, fy) = self.rows.place[y];
         let (x0, x1, fx) = self.cols.place[x];
+        let (fy, fx) = (T::from(fy), T::from(fx));
         let row = |y: usize| {
             let (left, right) = (cell(y * self.cols.n + x0), cell(y * self.cols.n + x1));
             left + (right - left) * fx

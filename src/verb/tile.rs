@@ -149,10 +149,10 @@ pub struct Costs {
     /// summed over L*, a* and b* (paper eq. 1 and 3), in L*a*b* units.
     pub stationarity: f64,
     /// The cost under the measure of the parameters: the same number for the histogram; for the
-    /// moments, the mean squared difference of two places' moments of normalized values, in L*a*b*
-    /// units squared (paper eq. 2); for the steerable filters, the earth mover's distance summed
-    /// over twelve responses, in L*a*b* units (paper eq. 4). `None` without a measure. Comparable
-    /// between tiles of the same measure and order only.
+    /// moments, the mean squared difference of two places' moments (of values counted from the
+    /// mean in tens of units), in L*a*b* units squared (paper eq. 2); for the steerable filters,
+    /// the earth mover's distance summed over twelve responses, in L*a*b* units (paper eq. 4).
+    /// `None` without a measure. Comparable between tiles of the same measure and order only.
     pub stationarity_by_measure: Option<f64>,
 }
 

@@ -51,24 +51,24 @@ fn same_bytes_for_any_number_of_threads_and_any_instructions() {
     }
 }
 
-/// A stain, or a place where the grain is rougher.
+/// A stain; for the filters, grain that gets rougher from left to right.
 fn uneven(measure: Measure, seed: u64) -> Picture {
     if measure != Measure::Steerable {
         return stained(160, 160, seed).picture();
     }
     let fine = grain(160, 160, seed);
     let rough = |y: usize, x: usize| {
-        let inside = (y as f64 - 70.0).hypot(x as f64 - 80.0) < 40.0;
-        fine.rgb[y * 160 + x].map(|v| if inside { v } else { 0.5 + 0.1 * (v - 0.5) })
+        fine.rgb[y * 160 + x].map(|v| 0.5 + (0.1 + 0.9 * x as f64 / 160.0) * (v - 0.5))
     };
     Exemplar::from_fn(160, 160, rough).picture()
 }
 
-/// Each measure lowers its own cost against the baseline without any.
+/// Each measure lowers its own cost against the baseline without any. The filters do so the least:
+/// within a window there are few patches, and they are copied whole.
 #[test]
 fn each_measure_evens_out_what_it_measures() {
     for (measure, order) in MEASURES {
-        let mut ratios: Vec<f64> = (1..=3)
+        let mut ratios: Vec<f64> = (1..=5)
             .map(|seed| {
                 let photo = uneven(measure, seed);
                 let cost = |method| {
@@ -79,7 +79,8 @@ fn each_measure_evens_out_what_it_measures() {
             })
             .collect();
         ratios.sort_by(f64::total_cmp);
-        assert!(ratios[1] < 0.7, "{measure:?} {order}: {ratios:.2?} of wrap-only's cost");
+        let most = if measure == Measure::Steerable { 0.9 } else { 0.5 };
+        assert!(ratios[2] < most, "{measure:?} {order}: {ratios:.2?} of wrap-only's cost");
     }
 }
 

@@ -37,7 +37,9 @@ pub(super) fn plane_cost(
 /// Each channel's value c moves towards `G^-1(F_x(c))`, `F_x` the local distribution around its
 /// pixel, `G` the global one.
 pub(super) fn project(pixels: &mut [Soft], domain: Domain, window: &Window, share: f32) {
-    project_channels(pixels, domain, window, share, |code, sigma| mapping(code, domain, sigma));
+    project_channels(pixels, 0..4, domain, window, share, |code, sigma| {
+        mapping(code, domain, sigma)
+    });
 }
 
 /// What makes the local distributions of these codes global.

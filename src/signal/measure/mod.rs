@@ -8,11 +8,13 @@ mod steerable;
 pub use moments::{ORDERS, Order};
 pub use pearson::Pearson;
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use crate::signal::histogram::{Soft, bin_of, rounded};
 use crate::signal::localhist::EDGES;
-use crate::signal::window::{Domain, Grid, Window};
+use crate::signal::window::{Domain, Grid, Summed, Window};
 
 /// A statistic of the surroundings of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -94,16 +96,17 @@ fn wanted(
     wanted
 }
 
-/// Moves the codes of each channel that is not constant by `share` towards what `mapping(codes,
+/// Moves the codes of each of these channels that is not constant by `share` towards what `mapping(codes,
 /// sigma)` makes of them.
 fn project_channels(
     pixels: &mut [Soft],
+    channels: Range<usize>,
     domain: Domain,
     window: &Window,
     share: f32,
     mapping: impl Fn(&(dyn Fn(usize) -> u16 + Sync), f64) -> Mapping,
 ) {
-    for k in 0..4 {
+    for k in channels {
         let first = pixels[0][k];
         if pixels.iter().all(|px| px[k] == first) {
             continue;
@@ -118,25 +121,25 @@ fn project_channels(
 
 /// Of the middles of a grid's cells, `n` numbers each: `cell(sigma)` gives a grid and the numbers of
 /// its cells for each size of window; between the sizes they are blended as the window says.
-fn at_places(
+fn at_places<T: Summed>(
     n: usize,
     domain: Domain,
     window: &Window,
-    cells: impl Fn(f64) -> (Grid, Vec<f32>),
-) -> Vec<f32> {
+    cells: impl Fn(f64) -> (Grid, Vec<T>),
+) -> Vec<T> {
     if let [even] = window.scales() {
         return cells(even.sigma).1;
     }
     // The smallest windows have the finest grid.
     let finest = Grid::new(domain, window.scales()[0].sigma);
-    let mut places = vec![0f32; finest.cells() * n];
+    let mut places = vec![T::default(); finest.cells() * n];
     for scale in window.scales() {
         let (grid, values) = cells(scale.sigma);
         for (out, (y, x)) in places.chunks_exact_mut(n).zip(finest.middles()) {
             let weight = scale.weight.as_ref().map_or(1.0, |w| w[y * domain.width + x]);
             if weight > 0.0 {
                 for (j, out) in out.iter_mut().enumerate() {
-                    *out += weight * grid.between(y, x, |cell| values[cell * n + j]);
+                    *out += T::from(weight) * grid.between(y, x, |cell| values[cell * n + j]);
                 }
             }
         }

@@ -78,32 +78,31 @@ fn local(z: impl Fn(usize) -> f64 + Sync, domain: Domain, sigma: f64) -> (Grid, 
     (grid, blurred, total)
 }
 
+/// In the cost, values are counted from the picture's mean in tens of the pixels' units (L*a*b*):
+/// the orders' sums are then of like size. A fixed unit, so that tiles can be compared.
+const UNIT: f64 = 10.0;
+
 /// Mean squared difference of the local moments of two places, summed over the orders up to `order`
-/// and the channels, in the pixels' units squared. Each channel is normalized to its own mean and
-/// deviation first, and the result scaled back by the variance: with one moment it is the
-/// mean squared difference of local means, and every moment more counts alike.
+/// and the channels, in the pixels' units squared. With one moment it is the mean squared difference
+/// of local means; higher ones count as [`UNIT`] says.
 pub(super) fn cost(order: Order, pixels: &[[f32; 3]], domain: Domain, window: &Window) -> f64 {
     let n_moments = order as usize + 1;
     let channel = |k: usize| {
         let value = |i: usize| f64::from(pixels[i][k]);
-        let scale = Scale::of((0..pixels.len()).map(value));
-        if scale.deviation <= 0.0 {
-            return 0.0;
-        }
+        let mean = Scale::of((0..pixels.len()).map(value)).mean;
         let places = at_places(n_moments, domain, window, |sigma| {
-            let (grid, sums, _) = local(|i| scale.normalized(value(i)), domain, sigma);
-            let moments =
-                |s: &Sums| (1..=n_moments).map(|p| (s[p] / s[0]) as f32).collect::<Vec<_>>();
+            let (grid, sums, _) = local(|i| (value(i) - mean) / UNIT, domain, sigma);
+            let moments = |s: &Sums| (1..=n_moments).map(|p| s[p] / s[0]).collect::<Vec<_>>();
             (grid, sums.iter().flat_map(moments).collect())
         });
         let n = (places.len() / n_moments) as f64;
         let pairs = |p: usize| {
-            let of = || places.iter().skip(p).step_by(n_moments).map(|&m| f64::from(m));
+            let of = || places.iter().skip(p).step_by(n_moments);
             // The mean squared difference of all pairs is twice the variance.
             let mean = of().sum::<f64>() / n;
             2.0 * of().map(|m| (m - mean) * (m - mean)).sum::<f64>() / n
         };
-        scale.deviation * scale.deviation * (0..n_moments).map(pairs).sum::<f64>()
+        UNIT * UNIT * (0..n_moments).map(pairs).sum::<f64>()
     };
     (0..3).map(channel).sum()
 }
@@ -148,7 +147,7 @@ pub(super) fn project(
     window: &Window,
     share: f32,
 ) {
-    project_channels(pixels, domain, window, share, |code, sigma| {
+    project_channels(pixels, 0..4, domain, window, share, |code, sigma| {
         mapping(order, code, domain, sigma)
     });
 }

@@ -5,11 +5,12 @@ use rayon::prelude::*;
 
 use crate::signal::histogram::{SOFT_BITS, Soft, rounded};
 use crate::signal::measure::histogram::{mapping, plane_cost};
-use crate::signal::measure::wanted;
+use crate::signal::measure::{project_channels, wanted};
 use crate::signal::steerable::Pyramid;
 use crate::signal::window::{Domain, Window};
 
-/// Colour channels; local contrast is no light that could be filtered.
+/// Colour channels. The fourth, local contrast, is such a response itself (of all directions
+/// together) and is treated like one.
 const COLORS: usize = 3;
 
 /// The soft code of no response: the middle of a bin, for most responses are near it.
@@ -29,6 +30,9 @@ pub(super) fn cost(pixels: &[[f32; 3]], domain: Domain, window: &Window) -> f64 
 /// Each response moves towards one whose local histogram is the same everywhere; the picture is put
 /// together from the responses and what they leave over.
 pub(super) fn project(pixels: &mut [Soft], domain: Domain, window: &Window, share: f32) {
+    project_channels(pixels, COLORS..4, domain, window, share, |code, sigma| {
+        mapping(code, domain, sigma)
+    });
     for k in 0..COLORS {
         let first = pixels[0][k];
         if pixels.iter().all(|px| px[k] == first) {
