@@ -208,6 +208,7 @@ impl Band<'_> {
         let mut distances = [0; 3 + MAX_RANDOM];
         // The distances of the matches in the row that the scan has just left.
         let mut row_distances = vec![0; width];
+        let mut random = vec![Pos::new(0, 0); width * radii.len()];
         for step in 0..n_rows {
             let row = if backward { n_rows - 1 - step } else { step };
             let y = y0 + row;
@@ -219,6 +220,11 @@ impl Band<'_> {
                 from[..width].to_vec()
             });
             let row = &mut rows[row * width..(row + 1) * width];
+            // Drawn for the whole row ahead: the search need not wait for the dice.
+            let items = (y * width..).zip(row.iter());
+            for ((item, own), out) in items.zip(random.chunks_exact_mut(radii.len().max(1))) {
+                self.random_candidates(*own, &radii, item, out);
+            }
             let end = if backward { 0 } else { width - 1 };
             let mut beside = self.wrap.x.then(|| row[end]);
             for at in 0..width {
@@ -238,8 +244,10 @@ impl Band<'_> {
                 beside.and_then(|p| p.shifted(0, d, self.source)).map(&mut add);
                 let above = above.as_ref().and_then(|row| row[x].shifted(d, 0, self.source));
                 let known = above.map(|pos| (add(pos), pos)).filter(|_| step > 0);
-                self.random_candidates(own, &radii, y * width + x, &mut candidates[n..]);
-                n += radii.len();
+                for &pos in &random[x * radii.len()..][..radii.len()] {
+                    candidates[n] = pos;
+                    n += 1;
+                }
                 // A match that moved by a row along with its pixel has lost one row of differences
                 // and won another: no need to sum the others again.
                 let known = known.map_or(usize::MAX, |(i, pos)| {

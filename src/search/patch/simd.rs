@@ -176,22 +176,24 @@ mod x86 {
         b: (&MatchImage, [usize; 2]),
     ) -> i32 {
         let inside = inside(patch);
-        let squares = |i: usize| {
+        // No closures: they would not be compiled for the instruction set.
+        // SAFETY: a kernel exists only inside `run_*`, where the features are.
+        let mut sums = [unsafe { _mm512_setzero_si512() }; 2];
+        for (i, sum) in sums.iter_mut().enumerate() {
             let (a, b) = (checked(a.0, a.1[i], patch, 1), checked(b.0, b.1[i], patch, 1));
-            // SAFETY: inside the pictures, or their tails, by `checked`; a kernel exists only
-            // inside `run_*`, where the features are.
+            // SAFETY: inside the pictures, or their tails, by `checked`; features as above.
             unsafe {
-                let load = |at: *const u8| _mm512_loadu_si512(at.cast());
-                let zero = _mm512_setzero_si512();
-                let sum = add_squares::<M>(zero, load(a), load(b), inside[0]);
-                if patch <= 16 {
-                    return sum;
+                let (f, e) = (_mm512_loadu_si512(a.cast()), _mm512_loadu_si512(b.cast()));
+                *sum = add_squares::<M>(*sum, f, e, inside[0]);
+                if patch > 16 {
+                    let f = _mm512_loadu_si512(a.add(64).cast());
+                    let e = _mm512_loadu_si512(b.add(64).cast());
+                    *sum = add_squares::<M>(*sum, f, e, inside[1]);
                 }
-                add_squares::<M>(sum, load(a.add(64)), load(b.add(64)), inside[1])
             }
-        };
+        }
         // SAFETY: features as above.
-        unsafe { _mm512_reduce_add_epi32(_mm512_sub_epi32(squares(0), squares(1))) }
+        unsafe { _mm512_reduce_add_epi32(_mm512_sub_epi32(sums[0], sums[1])) }
     }
 
     /// Any patch side: a row is one register or two.
@@ -345,21 +347,22 @@ mod x86 {
         #[inline(always)]
         fn row_change(&self, a: (&MatchImage, [usize; 2]), b: (&MatchImage, [usize; 2])) -> i32 {
             let n = self.side();
-            let squares = |k: usize| {
-                let (a, b) = (checked(a.0, a.1[k], n, 1), checked(b.0, b.1[k], n, 1));
-                // SAFETY: inside the pictures, or their tails, by `checked`; feature as above.
-                unsafe {
-                    let load = |at: *const u8| _mm256_loadu_si256(at.cast());
-                    let mut sum = _mm256_setzero_si256();
-                    for i in 0..n.div_ceil(8) {
-                        let (a, b) = (load(a.add(32 * i)), load(b.add(32 * i)));
-                        sum = _mm256_add_epi32(sum, self.squares(a, b, i));
-                    }
-                    sum
-                }
-            };
+            // No closures: they would not be compiled for the instruction set.
             // SAFETY: feature as above.
-            unsafe { Self::total(_mm256_sub_epi32(squares(0), squares(1))) }
+            let mut sums = [unsafe { _mm256_setzero_si256() }; 2];
+            for (k, sum) in sums.iter_mut().enumerate() {
+                let (a, b) = (checked(a.0, a.1[k], n, 1), checked(b.0, b.1[k], n, 1));
+                for i in 0..n.div_ceil(8) {
+                    // SAFETY: inside the pictures, or their tails, by `checked`; feature as above.
+                    unsafe {
+                        let f = _mm256_loadu_si256(a.add(32 * i).cast());
+                        let e = _mm256_loadu_si256(b.add(32 * i).cast());
+                        *sum = _mm256_add_epi32(*sum, self.squares(f, e, i));
+                    }
+                }
+            }
+            // SAFETY: feature as above.
+            unsafe { Self::total(_mm256_sub_epi32(sums[0], sums[1])) }
         }
     }
 
