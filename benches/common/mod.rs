@@ -2,6 +2,8 @@
 
 #![allow(dead_code, reason = "each benchmark uses its own part")]
 
+pub(crate) mod barnes;
+
 use criterion::Throughput;
 use criterion::measurement::{Measurement, ValueFormatter, WallTime};
 use texforge::base::rng::Rng;
@@ -178,8 +180,7 @@ pub(crate) fn exhaustive(
             for y in 0..source.rows() {
                 for x in 0..source.cols() {
                     let pos = Pos::new(y, x);
-                    let dot = kernel.dot(&query, &source.image, source.at(pos));
-                    best = best.min((source.bias(pos) - 2 * dot, pos));
+                    best = best.min((kernel.distance(&query, &source.image, source.at(pos)), pos));
                 }
             }
             best.1
