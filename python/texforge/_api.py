@@ -48,6 +48,7 @@ def tile(
     quality: Quality = "normal",
     seed: int = 0,
     mask: ImageLike | None = None,
+    sigma_map: ImageLike | None = None,
     maps: Mapping[str, ImageLike] | None = None,
     encoding: Encoding | Literal["auto"] = "auto",
     threads: int | None = None,
@@ -92,6 +93,10 @@ def tile(
         Seed of all random choices, 0 to 2**64 - 1.
     mask : (H, W) array_like, or Pillow image, optional
         Where the photo may be used: True, or at least half of full scale (128 of 255).
+    sigma_map : (H', W') array_like, or Pillow image, optional
+        Sigma at every pixel of the tile (and of its size), in place of `sigma`. Floats are sigma
+        itself, 0.01 to 1. Of integers black is 0.01, half of full scale 0.1 and white 1, in even
+        factors. ``costs.stationarity`` is measured with `sigma` still.
     maps : mapping of str to array_like, optional
         Other maps of the same material by name, to be tiled the same way. The name decides what
         a map is: base colour and emission are colours, normals are vectors (and come out with
@@ -173,6 +178,9 @@ def tile(
         picture_out, map_out, maps_out, report_text = _texforge.tile(
             photo=photo.packed(),
             mask=None if mask is None else _arrays.mask(mask).packed(),
+            sigma_map=None
+            if sigma_map is None
+            else _arrays.picture(sigma_map, "the sigma map", "data").packed(),
             maps=[(name, other.packed(), kinds[name]) for name, other in others.items()],
             params=list(params.items()),
             seed=_arrays.integer("seed", seed),

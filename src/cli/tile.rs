@@ -20,7 +20,10 @@ use crate::cli::{args, files, preview};
 use crate::image::mask::Mask;
 use crate::image::material::{MapKind, Sibling};
 use crate::image::picture::Picture;
-use crate::verb::tile::{Costs, Measure, Method, Report, Size, Tile, TileParams, tile};
+use crate::image::sigma_map::SigmaMap;
+use crate::verb::tile::{
+    Costs, Guides, Measure, Method, Report, Size, Tile, TileParams, tile_guided,
+};
 
 /// What was typed, checked as far as it can be without looking at a file.
 #[derive(Debug)]
@@ -29,6 +32,7 @@ struct Request {
     target: Target,
     params: TileParams,
     mask: Option<PathBuf>,
+    sigma_map: Option<PathBuf>,
     maps: Vec<Wanted>,
     pick_up: bool,
     source_map: Option<PathBuf>,
@@ -128,6 +132,7 @@ impl Request {
             target,
             params,
             mask: path("mask"),
+            sigma_map: path("sigma-map"),
             maps,
             source_map,
             preview,
@@ -137,7 +142,8 @@ impl Request {
 
     fn inputs(&self) -> Vec<&Path> {
         let maps = self.maps.iter().map(|m| m.path.as_path());
-        maps.chain([self.photo.as_path()]).chain(self.mask.as_deref()).collect()
+        let guides = self.mask.as_deref().into_iter().chain(self.sigma_map.as_deref());
+        maps.chain([self.photo.as_path()]).chain(guides).collect()
     }
 
     /// Fails if an output cannot be written, or two outputs are the same file.
@@ -190,13 +196,18 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Str
             Some(mask)
         }
     };
+    let sigma_map = match &request.sigma_map {
+        None => None,
+        Some(path) => Some(SigmaMap::from_picture(&files::read(path, MapKind::Data)?)?),
+    };
     let maps = read_maps(session, request, &photo, &mut notes)?;
     request.check_outputs(&maps)?;
     files::ensure_can_hold(&photo, request.target.file(), MapKind::Color)?;
     session.check()?;
 
     // The long work.
-    let Tile { picture, source_map, report } = tile(ctx, &photo, mask.as_ref(), &request.params)?;
+    let guides = Guides { mask: mask.as_ref(), sigma_map: sigma_map.as_ref() };
+    let Tile { picture, source_map, report } = tile_guided(ctx, &photo, guides, &request.params)?;
     notes.extend(report.notes.iter().cloned());
 
     // Encode and stage every file; the maps follow the tile.

@@ -13,11 +13,12 @@ use crate::image::color::ColorModel;
 use crate::image::mask::Mask;
 use crate::image::material::MapKind;
 use crate::image::picture::Picture;
+use crate::image::sigma_map::SigmaMap;
 use crate::image::sourcemap::SourceMap;
 use crate::method::{make_seamless, stationary};
 use crate::search::patchmatch::Wrap;
 use crate::signal::measure::{ORDERS, Statistic};
-use crate::signal::window::{Domain, Window};
+use crate::signal::window::Domain;
 
 /// Longest side of a tile, in pixels.
 const MAX_TILE_SIDE: usize = 32_768;
@@ -207,14 +208,16 @@ impl TileParams {
         (pow2(w.min(h)), pow2(w.min(h)))
     }
 
-    /// What `measure` and `order` say.
-    fn statistic(&self) -> Option<Statistic> {
-        match self.measure {
-            Measure::Histogram => Some(Statistic::Histogram),
-            Measure::Moments => Some(Statistic::Moments(ORDERS[self.order - 1])),
-            Measure::Steerable => Some(Statistic::Steerable),
-            Measure::None => None,
-        }
+    /// What `measure`, `order` and `sigma`, or the map in its place, say.
+    fn evenness(&self, sigma_map: Option<&SigmaMap>) -> Option<stationary::Evenness> {
+        let statistic = match self.measure {
+            Measure::Histogram => Statistic::Histogram,
+            Measure::Moments => Statistic::Moments(ORDERS[self.order - 1]),
+            Measure::Steerable => Statistic::Steerable,
+            Measure::None => return None,
+        };
+        let sigma_map = sigma_map.cloned();
+        Some(stationary::Evenness { statistic, sigma: self.sigma, sigma_map })
     }
 }
 
@@ -236,8 +239,36 @@ impl TileParams {
 /// [`Error::EmptyMask`], [`Error::SizeMismatch`] (mask), [`Error::NotFinite`], [`Error::Memory`]
 /// (checked before anything is allocated), [`Error::Cancelled`].
 pub fn tile(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, params: &TileParams) -> Result<Tile> {
+    tile_guided(ctx, photo, Guides { mask, sigma_map: None }, params)
+}
+
+/// Pictures that guide [`tile_guided`].
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Guides<'a> {
+    /// Where the photo may be used; of the photo's size.
+    pub mask: Option<&'a Mask>,
+    /// How far the measure reaches at every pixel, in place of `sigma`; of the tile's size. The
+    /// histogram's cost is measured with `sigma` still, that of the measure in use with the map.
+    pub sigma_map: Option<&'a SigmaMap>,
+}
+
+/// [`tile`], with further pictures that say what is wanted where.
+///
+/// # Paper
+/// Moritz et al. 2017, Fig. 10: a locally prescribed reach. Statistics are computed under windows of a
+/// few sizes and their mappings blended at every pixel.
+///
+/// # Errors
+/// Those of [`tile`]; [`Error::SizeMismatch`] (sigma map).
+pub fn tile_guided(
+    ctx: &Ctx,
+    photo: &Picture,
+    guides: Guides<'_>,
+    params: &TileParams,
+) -> Result<Tile> {
+    let Guides { mask, sigma_map } = guides;
     let start = Instant::now();
-    let (width, height) = check(photo, params)?;
+    let (width, height) = check(photo, sigma_map, params)?;
     let size = (height, width);
     let wrap = Wrap { y: params.axis != Axis::X, x: params.axis != Axis::Y };
     let mask = usable_mask(photo, mask)?;
@@ -245,17 +276,23 @@ pub fn tile(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, params: &TileParams
     if mask.is_some() && params.method == Method::MakeSeamless {
         notes.push("the method make-seamless uses the whole photo; the mask is ignored".to_owned());
     }
+    if sigma_map.is_some()
+        && (params.method != Method::Stationary || params.measure == Measure::None)
+    {
+        notes.push("nothing is made stationary; the sigma map changes no pixel".to_owned());
+    }
 
     let (picture, source_map) = ctx.install(|| {
         if params.method == Method::MakeSeamless {
             return Ok((make_seamless::run(photo, size, wrap)?, None));
         }
-        let plan = plan(params, size, wrap);
+        let plan = plan(params, sigma_map, size, wrap);
         let map = stationary::run(ctx, photo, mask.as_ref(), &plan)?;
         Ok((map.apply(photo, MapKind::Color)?, Some(map)))
     })?;
     let made = start.elapsed();
-    let costs = ctx.install(|| Ok(costs(photo, &picture, source_map.as_ref(), params, wrap)))?;
+    let costs =
+        ctx.install(|| Ok(costs(photo, &picture, source_map.as_ref(), params, sigma_map, wrap)))?;
     let mut resolved = params.clone();
     resolved.size = Size::Pixels { width, height };
     let report = Report {
@@ -275,7 +312,11 @@ pub fn tile(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, params: &TileParams
 }
 
 /// Checks everything that can be known before the work; returns the tile's width and height.
-fn check(photo: &Picture, params: &TileParams) -> Result<(usize, usize)> {
+fn check(
+    photo: &Picture,
+    sigma_map: Option<&SigmaMap>,
+    params: &TileParams,
+) -> Result<(usize, usize)> {
     params.validate()?;
     if params.patch.is_multiple_of(2) {
         return Err(Error::parameter("patch", "odd, so that a patch has a middle", params.patch));
@@ -314,8 +355,15 @@ fn check(photo: &Picture, params: &TileParams) -> Result<(usize, usize)> {
         ));
     }
     photo.ensure_finite("the photo")?;
+    if let Some(map) = sigma_map {
+        map.ensure_size(height, width)?;
+    }
+    // A filtered channel is eleven planes of floats; a sigma map has up to eight planes of weights.
+    let filtered = if params.measure == Measure::Steerable { 44 } else { 0 };
+    let mapped = if sigma_map.is_some() { 48 } else { 0 };
+    let pixel = filtered + mapped + (photo.byte_len() / (pw * ph)) as u64;
     let need = stationary::memory_bytes((ph, pw), (height, width))
-        .checked_add((width * height) as u64 * (photo.byte_len() / (pw * ph)) as u64);
+        .checked_add((width * height) as u64 * pixel);
     ensure_available(&format!("a {width}x{height} tile from a {pw}x{ph} photo"), need)?;
     Ok((width, height))
 }
@@ -333,7 +381,12 @@ fn usable_mask(photo: &Picture, mask: Option<&Mask>) -> Result<Option<Mask>> {
     Ok(both.filter(|m| m.count() < m.usable().len()))
 }
 
-fn plan(params: &TileParams, size: (usize, usize), wrap: Wrap) -> stationary::Plan {
+fn plan(
+    params: &TileParams,
+    sigma_map: Option<&SigmaMap>,
+    size: (usize, usize),
+    wrap: Wrap,
+) -> stationary::Plan {
     let even = params.method == Method::Stationary;
     let wraps = params.method != Method::NoWrap;
     let (coarse_iterations, fine_iterations) = match params.quality {
@@ -341,11 +394,10 @@ fn plan(params: &TileParams, size: (usize, usize), wrap: Wrap) -> stationary::Pl
         Quality::Normal => (30, 2),
         Quality::Best => (60, 6),
     };
-    let evenness = |statistic| stationary::Evenness { statistic, sigma: params.sigma };
     stationary::Plan {
         size,
         wrap: Wrap { y: wrap.y && wraps, x: wrap.x && wraps },
-        evenness: params.statistic().filter(|_| even).map(evenness),
+        evenness: params.evenness(sigma_map).filter(|_| even),
         patch: params.patch,
         uniformity: params.uniformity,
         coarse_iterations,
@@ -358,6 +410,7 @@ fn costs(
     picture: &Picture,
     map: Option<&SourceMap>,
     params: &TileParams,
+    sigma_map: Option<&SigmaMap>,
     wrap: Wrap,
 ) -> Costs {
     let model = ColorModel::new(photo);
@@ -367,13 +420,13 @@ fn costs(
     let domain = Domain { height, width, wrap_y: wrap.y, wrap_x: wrap.x };
     let sigma = f64::from(params.sigma) * height.min(width) as f64;
     let stationarity = stationarity::histogram_cost(&pixels, domain, sigma);
-    let by_measure = |statistic| match statistic {
-        Statistic::Histogram => stationarity,
-        other => other.cost(&pixels, domain, &Window::even(sigma)),
+    let by_measure = |evenness: stationary::Evenness| match evenness.statistic {
+        Statistic::Histogram if sigma_map.is_none() => stationarity,
+        other => other.cost(&pixels, domain, &evenness.window((height, width), domain)),
     };
     Costs {
         texture: map.map(|map| texture::cost_bound(picture, photo, map, params.patch, wrap)),
         stationarity,
-        stationarity_by_measure: params.statistic().map(by_measure),
+        stationarity_by_measure: params.evenness(sigma_map).map(by_measure),
     }
 }

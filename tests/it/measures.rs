@@ -154,3 +154,112 @@ fn the_command_line_knows_them() {
     let said = String::from_utf8_lossy(&refused.stderr).into_owned();
     assert!(!refused.status.success() && said.contains("`order` must be 1 to 4, got 5"), "{said}");
 }
+
+mod sigma_map {
+    use super::*;
+    use texforge::image::color::ColorModel;
+    use texforge::signal::measure::Statistic;
+    use texforge::signal::window::{Domain, Window};
+    use texforge::{ErrorKind, Guides, SigmaMap, tile_guided};
+
+    const SIDE: usize = 128;
+
+    fn map(side: usize, sigma: impl Fn(usize) -> f32) -> SigmaMap {
+        let values = (0..side * side).map(|i| sigma(i % side)).collect();
+        let picture = Picture::new(side, side, 1, Samples::F32(values), Encoding::Data);
+        SigmaMap::from_picture(&picture.expect("picture")).expect("a map")
+    }
+
+    fn guided(photo: &Picture, map: &SigmaMap, seed: u64, params: &TileParams) -> Tile {
+        let guides = Guides { mask: None, sigma_map: Some(map) };
+        let ctx = Ctx::new(seed, 2).expect("pool");
+        tile_guided(&ctx, photo, guides, params).expect("a tile")
+    }
+
+    /// How uneven the left and the right half are within a small window.
+    fn halves(photo: &Picture, tile: &Picture) -> [f64; 2] {
+        let model = ColorModel::new(photo);
+        let mut lab = model.averaging_pixels(tile);
+        model.space().convert_row(&mut lab);
+        [0, SIDE / 2].map(|x0| {
+            let rows = (0..SIDE).flat_map(|y| &lab[y * SIDE + x0..][..SIDE / 2]);
+            let half: Vec<[f32; 3]> = rows.copied().collect();
+            let domain = Domain { height: SIDE, width: SIDE / 2, wrap_y: true, wrap_x: false };
+            Statistic::Histogram.cost(&half, domain, &Window::even(0.05 * SIDE as f64))
+        })
+    }
+
+    #[test]
+    fn where_sigma_is_small_small_things_are_evened_out() {
+        let small_left = map(SIDE, |x| if x < SIDE / 2 { 0.04 } else { 0.6 });
+        let small_right = map(SIDE, |x| if x < SIDE / 2 { 0.6 } else { 0.04 });
+        for (measure, order) in [(Measure::Histogram, 2), (Measure::Moments, 2)] {
+            let mut ratios: Vec<f64> = (0..5)
+                .map(|seed| {
+                    let photo = stained(176, 176, seed + 1).picture();
+                    let params = params(measure, order, SIDE);
+                    let left_to_right = |map: &SigmaMap| {
+                        let tile = guided(&photo, map, seed, &params);
+                        let [left, right] = halves(&photo, &tile.picture);
+                        left / right
+                    };
+                    left_to_right(&small_left) / left_to_right(&small_right)
+                })
+                .collect();
+            ratios.sort_by(f64::total_cmp);
+            assert!(ratios[2] < 0.7, "{measure:?}: {ratios:.2?} of the unevenness");
+        }
+    }
+
+    #[test]
+    fn same_bytes_for_any_number_of_threads_and_any_instructions() {
+        let photo = stained(72, 80, 1).picture();
+        let map = map(60, |x| 0.03 + 0.005 * x as f32);
+        for (measure, order) in [MEASURES[0], MEASURES[4], MEASURES[5]] {
+            // The axis that does not wrap has an apron, which the map must follow.
+            let axis = Axis::Y;
+            let params = TileParams { axis, quality: Quality::Draft, ..params(measure, order, 60) };
+            let run = |threads: usize, simd: Simd| {
+                let mut ctx = Ctx::new(3, threads).expect("pool");
+                ctx.simd = simd;
+                let guides = Guides { mask: None, sigma_map: Some(&map) };
+                let tile = tile_guided(&ctx, &photo, guides, &params).expect("a tile");
+                (tile.picture, tile.report.costs)
+            };
+            let want = run(1, Simd::Scalar);
+            for (threads, simd) in [(2, Simd::Avx2), (5, Simd::Avx512Vnni)] {
+                assert!(run(threads, simd) == want, "{measure:?} {order}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_map_of_another_size_is_refused() {
+        let photo = grain(64, 64, 1).picture();
+        let map = map(31, |_| 0.1);
+        let guides = Guides { mask: None, sigma_map: Some(&map) };
+        let ctx = Ctx::new(0, 1).expect("pool");
+        let params = params(Measure::Histogram, 2, 32);
+        let error = tile_guided(&ctx, &photo, guides, &params).expect_err("refused");
+        assert_eq!(error.kind(), ErrorKind::SizeMismatch);
+        let said = "the sigma map is 31x31 pixels, expected 32x32; \
+                    a sigma map must have the size of the tile";
+        assert_eq!(error.to_string(), said);
+    }
+
+    #[test]
+    fn on_the_command_line() {
+        let folder = Folder::with_photo();
+        folder.mask("halves.png", 48, |x, _| x >= 24);
+        folder.mask("small.png", 47, |x, _| x >= 24);
+        folder.mask("black.png", 48, |_, _| false);
+        let args = |map: &'static str| {
+            ["tile", "photo.png", "-o", "tile.png", "--size", "48", "--sigma-map", map]
+        };
+        folder.refuses(&args("small.png"), 1, "the sigma map is 47x47");
+        folder.refuses(&args("black.png"), 1, "the sigma map: it is black everywhere");
+        folder.refuses(&args("nowhere.png"), 1, "nowhere.png");
+        folder.does(&args("halves.png"));
+        assert_eq!(folder.png("tile.png").width, 48);
+    }
+}

@@ -93,6 +93,7 @@ PARAMETERS: dict[str, dict[str, Any]] = {
     "threads too many": {"threads": 1025},
     "encoding": {"encoding": "gamma"},
     "progress": {"progress": 3},
+    "order as text": {"measure": "moments", "order": "2"},
     "map's name": {"maps": {3: noise()}},
     "maps with nothing to follow": {
         "maps": {"height": noise()},

@@ -11,6 +11,7 @@ use crate::base::ctx::Ctx;
 use crate::base::error::Result;
 use crate::image::mask::Mask;
 use crate::image::picture::Picture;
+use crate::image::sigma_map::SigmaMap;
 use crate::image::sourcemap::SourceMap;
 use crate::search::field::{Field, Pos};
 use crate::search::patch::MatchImage;
@@ -19,6 +20,7 @@ use crate::search::seams;
 use crate::search::vote::{Votes, vote};
 use crate::signal::histogram::{Distribution, SOFT_BITS};
 use crate::signal::measure::Statistic;
+use crate::signal::resample::resized;
 use crate::signal::window::{Domain, Window};
 
 use level::Level;
@@ -65,12 +67,27 @@ pub struct Evenness {
     pub statistic: Statistic,
     /// Standard deviation of its window as a fraction of the output's shorter side.
     pub sigma: f32,
+    /// The same for every pixel of the output, in place of `sigma`.
+    pub sigma_map: Option<SigmaMap>,
 }
 
 impl Evenness {
-    /// The window at a level of this size.
-    fn window(&self, (height, width): (usize, usize)) -> Window {
-        Window::even(f64::from(self.sigma) * height.min(width) as f64)
+    /// The window at an output of this size, over a domain that may have an apron around it.
+    pub fn window(&self, (height, width): (usize, usize), domain: Domain) -> Window {
+        let side = height.min(width) as f32;
+        let Some(map) = &self.sigma_map else {
+            return Window::even(f64::from(self.sigma) * f64::from(side));
+        };
+        let gray: Vec<[f32; 3]> = map.values().iter().map(|&v| [v; 3]).collect();
+        let small = resized(&gray, map.size(), (height, width));
+        // What the map does not reach is like its edge.
+        let inside = |i: usize, n: usize, all: usize| i.saturating_sub((all - n) / 2).min(n - 1);
+        let at = |i: usize| {
+            let y = inside(i / domain.width, height, domain.height);
+            small[y * width + inside(i % domain.width, width, domain.width)][0] * side
+        };
+        let sigmas: Vec<f32> = (0..domain.height * domain.width).map(at).collect();
+        Window::prescribed(&sigmas)
     }
 }
 
@@ -98,6 +115,14 @@ pub fn run(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, plan: &Plan) -> Resu
         let coarsest = j == n_coarse;
         let mut usage = Usage::of(&f, &level.source, plan.uniformity * level.usage_unit);
         let (iterations, search) = effort(plan, level, coarsest);
+        let apron = |wrap: bool| if wrap { 0 } else { plan.patch - 1 };
+        let domain = Domain {
+            height: h + apron(plan.wrap.y),
+            width: w + apron(plan.wrap.x),
+            wrap_y: plan.wrap.y,
+            wrap_x: plan.wrap.x,
+        };
+        let window = plan.evenness.as_ref().map(|e| (e, e.window((h, w), domain)));
         for i in 0..iterations {
             let mut votes = vote(ctx.simd, &f, &level.source, plan.wrap);
             let fade = 1.0 - (i + 1) as f32 / iterations as f32;
@@ -109,11 +134,8 @@ pub fn run(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, plan: &Plan) -> Resu
             } else {
                 FINE_PROJECTION
             };
-            if let Some(evenness) = plan.evenness.as_ref().filter(|_| projection > 0.0) {
-                let (height, width) = (votes.height, votes.width);
-                let domain = Domain { height, width, wrap_y: plan.wrap.y, wrap_x: plan.wrap.x };
-                let window = evenness.window((h, w));
-                evenness.statistic.project(&mut votes.soft, domain, &window, projection);
+            if let Some((evenness, window)) = window.as_ref().filter(|_| projection > 0.0) {
+                evenness.statistic.project(&mut votes.soft, domain, window, projection);
             }
             let target = canvas(&votes, plan, (h, w));
             let now = Usage::of(&f, &level.source, plan.uniformity * level.usage_unit);
