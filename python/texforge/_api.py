@@ -44,6 +44,7 @@ def tile(
     sigma: float = 0.1,
     patch: int = 11,
     uniformity: float = 1.0,
+    rarity: float = 1.0,
     quality: Quality = "normal",
     seed: int = 0,
     mask: ImageLike | None = None,
@@ -80,6 +81,9 @@ def tile(
         features whole, smaller mixes more.
     uniformity : float
         How strongly every part of the photo is made to contribute equally, 0 (not at all) to 100.
+    rarity : float
+        How strongly single things that catch the eye (a leaf, a nail, a dark spot) are held
+        back, 0 (not at all) to 4. For the method ``"stationary"``.
     quality : {"draft", "normal", "best"}
         How much time to spend.
     seed : int
@@ -152,6 +156,7 @@ def tile(
         "sigma": _number("sigma", sigma),
         "patch": str(_arrays.integer("patch", patch)),
         "uniformity": _number("uniformity", uniformity),
+        "rarity": _number("rarity", rarity),
         "quality": _word("quality", quality),
     }
     if maps and method == "make-seamless":

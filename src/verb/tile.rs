@@ -125,6 +125,8 @@ params! {
         patch: usize = 11, in 3..=21, unit "px";
         /// How strongly every part of the photo is made to contribute equally; 0 switches it off.
         uniformity: f32 = 1.0, in 0.0..=100.0;
+        /// How strongly single things that catch the eye (a leaf, a nail, a dark spot) are held back; 0 treats them like the rest. For the method stationary.
+        rarity: f32 = 1.0, in 0.0..=4.0;
         /// How much time to spend.
         quality: Quality = Quality::Normal;
     }
@@ -320,6 +322,7 @@ fn plan(params: &TileParams, size: (usize, usize), wrap: Wrap) -> stationary::Pl
         sigma: even.then_some(params.sigma),
         patch: params.patch,
         uniformity: params.uniformity,
+        rarity: if even { params.rarity } else { 0.0 },
         coarse_iterations,
         fine_iterations,
     }

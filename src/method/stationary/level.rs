@@ -10,6 +10,8 @@ use rayon::prelude::*;
 
 use crate::search::field::Pos;
 use crate::search::patch::{CODE_MAX, MatchImage};
+use crate::search::place_cost::PlaceCost;
+use crate::search::rarity::rarity;
 use crate::search::source::Source;
 use crate::signal::histogram::{Distribution, Quantiles, SOFT_BITS, Soft};
 use crate::signal::localhist::{Domain, LocalDistributions};
@@ -31,6 +33,10 @@ const TYPICAL_WINDOW: f64 = 0.15;
 /// Cost of using a patch as often as the average, as a share of the patch's own variance. More
 /// drives neighbouring pixels to different places of the photo, and the vote blurs.
 const USAGE_SHARE: f64 = 0.024;
+
+/// Shorter side of the largest level at which rare places are looked for. A patch then spans a
+/// twentieth of the photo; what is smaller than a tenth of a patch here, nobody notices in a tile.
+const RARITY_SIDE: usize = 256;
 
 /// Affine map from L*a*b* to 7-bit codes, the same scale for all channels, so that distances of
 /// codes are Euclidean distances of colours.
@@ -99,6 +105,8 @@ pub(super) struct Level {
     pub(super) quantiles: [Quantiles; 4],
     /// Uniformity cost of using a patch as often as the average, in squared codes.
     pub(super) usage_unit: f32,
+    /// What rare places cost.
+    pub(super) rarity: PlaceCost,
 }
 
 /// All levels, finest first.
@@ -163,7 +171,23 @@ pub(super) fn build(
             }
         }
     }
+    if plan.rarity > 0.0 {
+        rate(ctx, &mut levels);
+    }
     Ok(levels)
+}
+
+/// Finds what is rare at the coarse levels; the finer ones take it over.
+fn rate(ctx: &Ctx, levels: &mut [Level]) {
+    let mut coarser: Option<PlaceCost> = None;
+    for level in levels.iter_mut().rev() {
+        let side = level.source.rows().min(level.source.cols());
+        level.rarity = match coarser {
+            Some(coarser) if side > RARITY_SIDE => coarser.resized(&level.source),
+            _ => rarity(ctx, &level.source),
+        };
+        coarser = Some(level.rarity.clone());
+    }
 }
 
 fn level(
@@ -230,7 +254,8 @@ fn level(
         })
         .sum();
     let usage_unit = (USAGE_SHARE * variance * (patch * patch) as f64) as f32;
-    Some(Level { size, source, quantiles, usage_unit })
+    let rarity = PlaceCost::free(&source);
+    Some(Level { size, source, quantiles, usage_unit, rarity })
 }
 
 /// The exemplar's typical local histogram of each colour: the median over all places of each

@@ -14,7 +14,8 @@ use crate::image::picture::Picture;
 use crate::image::sourcemap::SourceMap;
 use crate::search::field::{Field, Pos};
 use crate::search::patch::MatchImage;
-use crate::search::patchmatch::{self, Search, Usage, Wrap};
+use crate::search::patchmatch::{self, Search, Wrap};
+use crate::search::place_cost::PlaceCost;
 use crate::search::seams;
 use crate::search::vote::{Votes, vote};
 use crate::signal::histogram::{Distribution, SOFT_BITS};
@@ -52,6 +53,8 @@ pub struct Plan {
     pub patch: usize,
     /// Weight of spatial uniformity.
     pub uniformity: f32,
+    /// How much rare places cost, as a share of what they are rarer than others.
+    pub rarity: f32,
     /// Iterations at the coarsest level.
     pub coarse_iterations: u32,
     /// Iterations at each other level.
@@ -80,7 +83,7 @@ pub fn run(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, plan: &Plan) -> Resu
             Some(coarse) => coarse.upsampled(h, w, &level.source, ctx.seed),
         };
         let coarsest = j == n_coarse;
-        let mut usage = Usage::of(&f, &level.source, plan.uniformity * level.usage_unit);
+        let mut usage = PlaceCost::of_usage(&f, &level.source, plan.uniformity * level.usage_unit);
         let (iterations, search) = effort(plan, level, coarsest);
         for i in 0..iterations {
             let mut votes = vote(ctx.simd, &f, &level.source, plan.wrap);
@@ -100,10 +103,11 @@ pub fn run(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, plan: &Plan) -> Resu
                 localhist::project(&mut votes.soft, domain, sigma, projection);
             }
             let target = canvas(&votes, plan, (h, w));
-            let now = Usage::of(&f, &level.source, plan.uniformity * level.usage_unit);
+            let now = PlaceCost::of_usage(&f, &level.source, plan.uniformity * level.usage_unit);
             usage = now.averaged(&usage);
+            let cost = usage.clone().plus(plan.rarity, &level.rarity);
             let search = Search { pass, ..search };
-            patchmatch::pass(ctx, &target, &level.source, &usage, plan.wrap, search, &mut f)?;
+            patchmatch::pass(ctx, &target, &level.source, &cost, plan.wrap, search, &mut f)?;
             pass += 1;
         }
         field = Some(f);
