@@ -30,5 +30,9 @@ pub use base::error::{Error, ErrorKind, Result};
 pub use image::mask::Mask;
 pub use image::material::MapKind;
 pub use image::picture::{Encoding, Picture, Samples};
+pub use image::sigma_map::SigmaMap;
 pub use image::sourcemap::SourceMap;
-pub use verb::tile::{Axis, Costs, Measure, Method, Quality, Report, Size, Tile, TileParams, tile};
+pub use verb::tile::{
+    Axis, Costs, Guides, Measure, Method, Quality, Report, Size, Tile, TileParams, tile,
+    tile_guided,
+};

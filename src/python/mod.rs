@@ -21,8 +21,9 @@ use crate::image::io::{self, Format, WriteOptions};
 use crate::image::mask::Mask;
 use crate::image::material::{self, MapKind};
 use crate::image::picture::Picture;
+use crate::image::sigma_map::SigmaMap;
 use crate::image::sourcemap::SourceMap;
-use crate::verb::tile::TileParams;
+use crate::verb::tile::{Guides, TileParams};
 use array::{ArrayIn, ArrayOut, MapIn, MapOut, array_out, map_out};
 use error::IntoPy;
 
@@ -57,11 +58,12 @@ fn ensure_same_shape(name: &str, map: &Picture, photo: &Picture) -> Result<()> {
     reason = "one private caller, in _api.py, passes them by name"
 )]
 #[expect(clippy::type_complexity, reason = "one private caller, in _api.py, names its parts")]
-#[pyo3(signature = (*, photo, mask, maps, params, seed, threads, progress))]
+#[pyo3(signature = (*, photo, mask, sigma_map, maps, params, seed, threads, progress))]
 fn tile<'py>(
     py: Python<'py>,
     photo: ArrayIn<'py>,
     mask: Option<ArrayIn<'py>>,
+    sigma_map: Option<ArrayIn<'py>>,
     maps: Vec<NamedMap<'py>>,
     params: Vec<(String, String)>,
     seed: u64,
@@ -78,6 +80,10 @@ fn tile<'py>(
         Some(mask) => Some(Mask::from_picture(&mask.picture(py)?).into_py(py)?),
         None => None,
     };
+    let sigma_map = match sigma_map {
+        Some(map) => Some(SigmaMap::from_picture(&map.picture(py)?).into_py(py)?),
+        None => None,
+    };
     let mut others = Vec::with_capacity(maps.len());
     for (name, map, kind) in &maps {
         let map = map.picture(py)?;
@@ -87,7 +93,8 @@ fn tile<'py>(
     let ctx = Ctx::new(seed, threads).into_py(py)?;
     let job = ctx.job();
     let (tile, gathered) = enter::enter(py, &job, progress.as_ref(), move || {
-        let tile = crate::verb::tile::tile(&ctx, &photo, mask.as_ref(), &settings)?;
+        let guides = Guides { mask: mask.as_ref(), sigma_map: sigma_map.as_ref() };
+        let tile = crate::verb::tile::tile_guided(&ctx, &photo, guides, &settings)?;
         let mut gathered = Vec::with_capacity(others.len());
         if let Some(source_map) = &tile.source_map {
             for (name, map, kind) in others {

@@ -77,6 +77,9 @@ PARAMETERS: dict[str, dict[str, Any]] = {
     "rarity": {"rarity": 5},
     "method": {"method": "magic"},
     "measure": {"measure": 3},
+    "order zero": {"measure": "moments", "order": 0},
+    "order five": {"measure": "moments", "order": 5},
+    "order of nothing": {"order": 3},
     "axis": {"axis": "z"},
     "quality": {"quality": None},
     "size zero": {"size": 0},
@@ -91,6 +94,7 @@ PARAMETERS: dict[str, dict[str, Any]] = {
     "threads too many": {"threads": 1025},
     "encoding": {"encoding": "gamma"},
     "progress": {"progress": 3},
+    "order as text": {"measure": "moments", "order": "2"},
     "map's name": {"maps": {3: noise()}},
     "maps with nothing to follow": {
         "maps": {"height": noise()},

@@ -14,8 +14,9 @@ use crate::search::place_cost::PlaceCost;
 use crate::search::rarity::rarity;
 use crate::search::source::Source;
 use crate::signal::histogram::{Distribution, Quantiles, SOFT_BITS, Soft};
-use crate::signal::localhist::{Domain, LocalDistributions};
+use crate::signal::localhist::LocalDistributions;
 use crate::signal::resample::{resized, resized_mask};
+use crate::signal::window::Domain;
 
 /// Ratio of the sides of two neighbouring levels (the paper's).
 const RATIO: f64 = 1.3;
@@ -162,7 +163,7 @@ pub(super) fn build(
         }
     }
     // Only the coarsest level matches colours; without projection it is the paper's plain target.
-    if let (Some(coarsest), true) = (levels.last_mut(), plan.sigma.is_some()) {
+    if let (Some(coarsest), true) = (levels.last_mut(), plan.evenness.is_some()) {
         for (quantiles, typical) in
             coarsest.quantiles.iter_mut().zip(typical_quantiles(&coarsest.source))
         {
@@ -275,7 +276,8 @@ fn typical_quantiles(source: &Source) -> [Option<Quantiles>; CONTRAST] {
     let domain = Domain { height, width, wrap_y: false, wrap_x: false };
     let sigma = TYPICAL_WINDOW * height.min(width) as f64;
     std::array::from_fn(|k| {
-        LocalDistributions::new(&soft, Some(&usable), k, domain, sigma).typical()
+        let code = |i: usize| usable[i].then_some(soft[i][k]);
+        LocalDistributions::new(code, domain, sigma).typical()
     })
 }
 
