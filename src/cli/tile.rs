@@ -195,7 +195,8 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Str
     session.check()?;
 
     // The long work.
-    let Tile { picture, source_map, report } = tile(ctx, &photo, mask.as_ref(), &request.params)?;
+    let Tile { picture, source_map, report, .. } =
+        tile(ctx, &photo, mask.as_ref(), &request.params)?;
     notes.extend(report.notes.iter().cloned());
 
     // Encode and stage every file; the maps follow the tile.

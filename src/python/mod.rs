@@ -22,6 +22,9 @@ use crate::image::mask::Mask;
 use crate::image::material::{self, MapKind};
 use crate::image::picture::Picture;
 use crate::image::sourcemap::SourceMap;
+use crate::verb::texture_cost as measure;
+use crate::verb::texture_cost::TextureCostParams;
+use crate::verb::tile as verb;
 use crate::verb::tile::TileParams;
 use array::{ArrayIn, ArrayOut, MapIn, MapOut, array_out, map_out};
 use error::IntoPy;
@@ -50,14 +53,18 @@ fn ensure_same_shape(name: &str, map: &Picture, photo: &Picture) -> Result<()> {
     }
 }
 
-/// Makes a tile. Returns the picture, the source map, the gathered maps and the report as JSON.
+/// A line of a tile's trace: level, iteration, texture cost, stationarity cost.
+type StepOut = (usize, u32, Option<f64>, f64);
+
+/// Makes a tile. Returns the picture, the source map, the gathered maps, the report as JSON and the
+/// trace.
 #[pyfunction]
 #[expect(
     clippy::too_many_arguments,
     reason = "one private caller, in _api.py, passes them by name"
 )]
 #[expect(clippy::type_complexity, reason = "one private caller, in _api.py, names its parts")]
-#[pyo3(signature = (*, photo, mask, maps, params, seed, threads, progress))]
+#[pyo3(signature = (*, photo, mask, maps, params, seed, threads, progress, trace))]
 fn tile<'py>(
     py: Python<'py>,
     photo: ArrayIn<'py>,
@@ -67,17 +74,21 @@ fn tile<'py>(
     seed: u64,
     threads: usize,
     progress: Option<Bound<'py, PyAny>>,
-) -> PyResult<(ArrayOut<'py>, Option<MapOut<'py>>, Vec<(String, ArrayOut<'py>)>, String)> {
+    trace: bool,
+) -> PyResult<(
+    ArrayOut<'py>,
+    Option<MapOut<'py>>,
+    Vec<(String, ArrayOut<'py>)>,
+    String,
+    Vec<StepOut>,
+)> {
     let mut settings = TileParams::default();
     for (name, text) in &params {
         settings.set(name, text).into_py(py)?;
     }
     settings.validate().into_py(py)?;
     let photo = photo.picture(py)?;
-    let mask = match mask {
-        Some(mask) => Some(Mask::from_picture(&mask.picture(py)?).into_py(py)?),
-        None => None,
-    };
+    let mask = mask.map(|mask| mask_of(py, &mask)).transpose()?;
     let mut others = Vec::with_capacity(maps.len());
     for (name, map, kind) in &maps {
         let map = map.picture(py)?;
@@ -87,7 +98,8 @@ fn tile<'py>(
     let ctx = Ctx::new(seed, threads).into_py(py)?;
     let job = ctx.job();
     let (tile, gathered) = enter::enter(py, &job, progress.as_ref(), move || {
-        let tile = crate::verb::tile::tile(&ctx, &photo, mask.as_ref(), &settings)?;
+        let make = if trace { verb::tile_traced } else { verb::tile };
+        let tile = make(&ctx, &photo, mask.as_ref(), &settings)?;
         let mut gathered = Vec::with_capacity(others.len());
         if let Some(source_map) = &tile.source_map {
             for (name, map, kind) in others {
@@ -104,7 +116,46 @@ fn tile<'py>(
         .into_iter()
         .map(|(name, picture)| Ok((name, array_out(py, &picture)?)))
         .collect::<PyResult<_>>()?;
-    Ok((array_out(py, &tile.picture)?, source_map, maps, report))
+    let step = |s: &verb::Step| (s.level, s.iteration, s.costs.texture, s.costs.stationarity);
+    let trace = tile.trace.iter().map(step).collect();
+    Ok((array_out(py, &tile.picture)?, source_map, maps, report, trace))
+}
+
+fn mask_of(py: Python<'_>, mask: &ArrayIn<'_>) -> PyResult<Mask> {
+    Mask::from_picture(&mask.picture(py)?).into_py(py)
+}
+
+/// Measures the exact texture cost on a sample. Returns mean, margin and number of samples.
+#[pyfunction]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "one private caller, in _api.py, passes them by name"
+)]
+#[pyo3(signature = (*, texture, photo, source_map, mask, params, seed, threads, progress))]
+fn texture_cost<'py>(
+    py: Python<'py>,
+    texture: ArrayIn<'py>,
+    photo: ArrayIn<'py>,
+    source_map: Option<MapIn<'py>>,
+    mask: Option<ArrayIn<'py>>,
+    params: Vec<(String, String)>,
+    seed: u64,
+    threads: usize,
+    progress: Option<Bound<'py, PyAny>>,
+) -> PyResult<(f64, f64, usize)> {
+    let mut settings = TextureCostParams::default();
+    for (name, text) in &params {
+        settings.set(name, text).into_py(py)?;
+    }
+    let (texture, photo) = (texture.picture(py)?, photo.picture(py)?);
+    let map = source_map.map(|map| map.source_map(py)).transpose()?;
+    let mask = mask.map(|mask| mask_of(py, &mask)).transpose()?;
+    let ctx = Ctx::new(seed, threads).into_py(py)?;
+    let job = ctx.job();
+    let cost = enter::enter(py, &job, progress.as_ref(), move || {
+        measure::texture_cost(&ctx, &texture, &photo, map.as_ref(), mask.as_ref(), &settings)
+    })?;
+    Ok((cost.mean, cost.margin, cost.samples))
 }
 
 /// Gathers a map through a source map.
@@ -189,9 +240,10 @@ fn map_kind(name: &str) -> &'static str {
     }
 }
 
-/// Every parameter of `tile`, with its default as text.
+/// Every parameter of a verb (`texture_cost`, else `tile`), with its default as text.
 #[pyfunction]
-fn schema(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
+#[pyo3(signature = (verb = "tile"))]
+fn schema<'py>(py: Python<'py>, verb: &str) -> PyResult<Vec<Bound<'py, PyDict>>> {
     let entry = |param: crate::base::params::Param| {
         let dict = PyDict::new(py);
         dict.set_item("name", param.name)?;
@@ -203,7 +255,11 @@ fn schema(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
         dict.set_item("doc", param.doc)?;
         Ok(dict)
     };
-    TileParams::schema().into_iter().map(entry).collect()
+    let params = match verb {
+        TextureCostParams::VERB => TextureCostParams::schema(),
+        _ => TileParams::schema(),
+    };
+    params.into_iter().map(entry).collect()
 }
 
 /// The slug of every kind of error.
@@ -231,7 +287,7 @@ mod _texforge {
     #[pymodule_export]
     use super::{
         apply, cli_main, encode_png, error_kinds, fail, map_kind, read, read_source_map, schema,
-        tile, write, write_source_map,
+        texture_cost, tile, write, write_source_map,
     };
 
     use pyo3::prelude::*;

@@ -1,6 +1,6 @@
 //! [`tile`]: a photo becomes a texture that repeats.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
@@ -164,6 +164,22 @@ pub struct Report {
     pub notes: Vec<String>,
 }
 
+/// What an iteration has come to: one line of [`Tile::trace`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Step {
+    /// Level of the pyramid: 0 has the tile's size, every further one is smaller by 1.3.
+    pub level: usize,
+    /// Iteration at this level, from 1. The last of level 0 is the delivered tile: one more than
+    /// there are iterations, as the seams are settled after them.
+    pub iteration: u32,
+    /// The costs, as [`Report::costs`] has them, of the tile that would have been delivered if the
+    /// work had stopped here before the seams are settled: the middles of the matched patches.
+    /// Texture is compared with the photo at the level's resolution, and the window of the
+    /// stationarity cost is a fraction of the level's own size. On the last line they are those of
+    /// the report.
+    pub costs: Costs,
+}
+
 /// The result of [`tile`].
 #[derive(Debug, Clone)]
 pub struct Tile {
@@ -174,6 +190,9 @@ pub struct Tile {
     pub source_map: Option<SourceMap>,
     /// How it was made and what it costs.
     pub report: Report,
+    /// The costs of every iteration, coarse to fine; empty unless made by [`tile_traced`], and with
+    /// [`Method::MakeSeamless`], which has no iterations.
+    pub trace: Vec<Step>,
 }
 
 impl TileParams {
@@ -213,6 +232,30 @@ impl TileParams {
 /// [`Error::EmptyMask`], [`Error::SizeMismatch`] (mask), [`Error::NotFinite`], [`Error::Memory`]
 /// (checked before anything is allocated), [`Error::Cancelled`].
 pub fn tile(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, params: &TileParams) -> Result<Tile> {
+    make(ctx, photo, mask, params, false)
+}
+
+/// As [`tile`], the same bytes; but every iteration's costs are measured too, see [`Tile::trace`].
+/// The time that takes is listed apart in [`Report::seconds`].
+///
+/// # Errors
+/// As [`tile`].
+pub fn tile_traced(
+    ctx: &Ctx,
+    photo: &Picture,
+    mask: Option<&Mask>,
+    params: &TileParams,
+) -> Result<Tile> {
+    make(ctx, photo, mask, params, true)
+}
+
+fn make(
+    ctx: &Ctx,
+    photo: &Picture,
+    mask: Option<&Mask>,
+    params: &TileParams,
+    traced: bool,
+) -> Result<Tile> {
     let start = Instant::now();
     let (width, height) = check(photo, params)?;
     let size = (height, width);
@@ -223,15 +266,27 @@ pub fn tile(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, params: &TileParams
         notes.push("the method make-seamless uses the whole photo; the mask is ignored".to_owned());
     }
 
+    let mut trace = Vec::new();
+    let mut tracing = Duration::ZERO;
+    let mut look = |look: &stationary::Look<'_>| {
+        let since = Instant::now();
+        let picture = look.map.apply(look.exemplar, MapKind::Color)?;
+        let costs = costs(look.exemplar, &picture, Some(&look.map), params, wrap);
+        trace.push(Step { level: look.level, iteration: look.iteration, costs });
+        tracing += since.elapsed();
+        Ok(())
+    };
+    let watch: Option<stationary::Watch<'_>> = if traced { Some(&mut look) } else { None };
     let (picture, source_map) = ctx.install(|| {
         if params.method == Method::MakeSeamless {
             return Ok((make_seamless::run(photo, size, wrap)?, None));
         }
         let plan = plan(params, size, wrap);
-        let map = stationary::run(ctx, photo, mask.as_ref(), &plan)?;
+        let map = stationary::run(ctx, photo, mask.as_ref(), &plan, watch)?;
         Ok((map.apply(photo, MapKind::Color)?, Some(map)))
     })?;
     let made = start.elapsed();
+    let synthesis = made.saturating_sub(tracing);
     let costs = ctx.install(|| Ok(costs(photo, &picture, source_map.as_ref(), params, wrap)))?;
     let mut resolved = params.clone();
     resolved.size = Size::Pixels { width, height };
@@ -242,13 +297,17 @@ pub fn tile(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, params: &TileParams
         photo_size: (photo.width(), photo.height()),
         tile_size: (width, height),
         costs,
-        seconds: vec![
-            ("synthesis", made.as_secs_f64()),
-            ("costs", start.elapsed().saturating_sub(made).as_secs_f64()),
-        ],
+        seconds: [
+            Some(("synthesis", synthesis.as_secs_f64())),
+            traced.then_some(("trace", tracing.as_secs_f64())),
+            Some(("costs", start.elapsed().saturating_sub(made).as_secs_f64())),
+        ]
+        .into_iter()
+        .flatten()
+        .collect(),
         notes,
     };
-    Ok(Tile { picture, source_map, report })
+    Ok(Tile { picture, source_map, report, trace })
 }
 
 /// Checks everything that can be known before the work; returns the tile's width and height.
@@ -294,7 +353,7 @@ fn check(photo: &Picture, params: &TileParams) -> Result<(usize, usize)> {
 }
 
 /// Where the photo may be used: the caller's mask and the photo's own alpha; `None` is everywhere.
-fn usable_mask(photo: &Picture, mask: Option<&Mask>) -> Result<Option<Mask>> {
+pub(super) fn usable_mask(photo: &Picture, mask: Option<&Mask>) -> Result<Option<Mask>> {
     if let Some(mask) = mask {
         mask.ensure_size(photo.height(), photo.width())?;
     }
