@@ -13,11 +13,7 @@ use crate::image::sourcemap::SourceMap;
 use crate::search::field::Pos;
 use crate::search::patch::{CODE_MAX, Kernel, MatchImage, WithKernel, with_kernel};
 use crate::search::patchmatch::Wrap;
-use crate::search::source::{Source, UNUSABLE};
-
-/// Code distances from here on are those of unusable patches: patches of 21 x 21 x 3 codes are
-/// nearer than 2.2e7.
-const TOO_FAR: i32 = UNUSABLE / 2;
+use crate::search::source::Source;
 
 /// Which patches are drawn.
 #[derive(Debug, Clone, Copy)]
@@ -208,7 +204,8 @@ impl Codes {
         let off = patch as f64 * 3.0_f64.sqrt() * 0.5;
         // A little more, for the rounding of single floats.
         let reach = (distance.sqrt() / f64::from(self.step) + 2.0 * off) * 1.0001;
-        (reach * reach).min(f64::from(TOO_FAR)) as i32 + 1
+        // No distance of codes is larger: 21 x 21 x 3 codes differ by less than 2.2e7.
+        (reach * reach).min(1e9) as i32 + 1
     }
 }
 
@@ -225,8 +222,7 @@ struct Scan<'a> {
 impl Scan<'_> {
     /// The distance to a patch of the photo, if that may be used.
     fn known(&self, y: usize, x: usize, pos: Pos) -> Option<f64> {
-        let usable = self.source.bias(pos) != UNUSABLE;
-        usable.then(|| self.distance((y, x), (pos.y(), pos.x()), f64::INFINITY))
+        self.source.is_usable(pos).then(|| self.distance((y, x), (pos.y(), pos.x()), f64::INFINITY))
     }
 
     /// Squared distance of the colours of two patches (their top left corners), or something that is
@@ -266,14 +262,13 @@ impl WithKernel for Nearest<'_> {
         let (source, target) = (scan.source, scan.target);
         let mut query = kernel.query();
         kernel.hold(&mut query, target, target.at(y, x));
-        let own = kernel.dot(&query, target, target.at(y, x));
         let mut reach = scan.codes.reach(best, source.patch);
         for sy in 0..source.rows() {
             for sx in 0..source.cols() {
                 let pos = Pos::new(sy, sx);
-                let dot = kernel.dot(&query, &source.image, source.at(pos));
+                let codes = kernel.distance(&query, &source.image, source.at(pos));
                 // Codes sort out nearly all; colours decide.
-                if own + source.bias(pos) - 2 * dot < reach {
+                if codes < reach && source.is_usable(pos) {
                     let distance = scan.distance((y, x), (sy, sx), best);
                     if distance < best {
                         best = distance;
