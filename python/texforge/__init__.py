@@ -3,7 +3,8 @@
 `tile` makes a texture that repeats from a casual photo; the `Tile` it returns holds the picture
 and says which pixel of the photo each of its pixels is, so that other maps of the same material
 can follow (`apply`). `texture_cost` measures how much a texture looks like its photo.
-`read_image` and `write_image` keep all the bits that files have.
+`read_image` and `write_image` keep all the bits that files have. `study` compares the ways to
+tile over many photos.
 Everything raised on purpose is a `TexforgeError`.
 """
 
@@ -24,6 +25,7 @@ from texforge._errors import (
     TexforgeError,
 )
 from texforge._measure import texture_cost
+from texforge._study import Study, study
 from texforge._texforge import __version__
 from texforge._types import (
     Axis,
@@ -71,6 +73,7 @@ __all__ = [
     "SameFileError",
     "SourceMap",
     "Step",
+    "Study",
     "TexforgeError",
     "TextureCost",
     "Tile",
@@ -78,6 +81,7 @@ __all__ = [
     "apply",
     "load_source_map",
     "read_image",
+    "study",
     "texture_cost",
     "tile",
     "write_image",

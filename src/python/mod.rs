@@ -281,13 +281,34 @@ fn cli_main(py: Python<'_>, args: Vec<OsString>) -> u8 {
     py.detach(|| std::panic::catch_unwind(|| crate::cli::run(args)).unwrap_or(1))
 }
 
+/// Reads the command line of `study`; returns what was asked for, or the exit status if there is
+/// nothing to do.
+#[pyfunction]
+fn cli_study(py: Python<'_>, args: Vec<OsString>) -> PyResult<(u8, Option<Bound<'_, PyDict>>)> {
+    let request = match crate::cli::study::request(args) {
+        Ok(request) => request,
+        Err(status) => return Ok((status, None)),
+    };
+    let dict = PyDict::new(py);
+    dict.set_item("folder", request.folder)?;
+    dict.set_item("out", request.output)?;
+    dict.set_item("seeds", request.seeds)?;
+    dict.set_item("size", request.size)?;
+    dict.set_item("measures", request.measures)?;
+    dict.set_item("samples", request.samples)?;
+    dict.set_item("threads", request.threads)?;
+    dict.set_item("json", request.json)?;
+    dict.set_item("quiet", request.quiet)?;
+    Ok((0, Some(dict)))
+}
+
 /// The private module.
 #[pymodule(gil_used = false)]
 mod _texforge {
     #[pymodule_export]
     use super::{
-        apply, cli_main, encode_png, error_kinds, fail, map_kind, read, read_source_map, schema,
-        texture_cost, tile, write, write_source_map,
+        apply, cli_main, cli_study, encode_png, error_kinds, fail, map_kind, read, read_source_map,
+        schema, texture_cost, tile, write, write_source_map,
     };
 
     use pyo3::prelude::*;
