@@ -84,6 +84,10 @@ impl Codes {
     }
 }
 
+/// How many pixels have each code, per channel.
+type Counts = [[u32; CODE_MAX as usize + 1]; 4];
+const NOTHING: Counts = [[0; CODE_MAX as usize + 1]; 4];
+
 /// One level of the pyramid.
 #[derive(Debug)]
 pub(super) struct Level {
@@ -189,14 +193,29 @@ fn level(
     });
     let source = Source::new(with_contrast(&colors), patch, usable)?;
     let usable_pixel = |i: &usize| usable.is_none_or(|u| u[*i]);
-    let masses: [Vec<f64>; 4] = std::array::from_fn(|k| {
-        let mut masses = vec![0.0; CODE_MAX as usize + 1];
-        let code = |i: usize| source.image.pixel(i / ew, i % ew)[k] as usize;
-        // An odd step visits every column of a picture of even width.
-        let step = (eh * ew / 400_000) | 1;
-        (0..eh * ew).step_by(step).filter(usable_pixel).for_each(|i| masses[code(i)] += 1.0);
-        masses
-    });
+    // An odd step visits every column of a picture of even width.
+    let step = (eh * ew / 400_000) | 1;
+    let count = |mut counts: Counts, sample: usize| {
+        let i = sample * step;
+        if usable_pixel(&i) {
+            let px = source.image.pixel(i / ew, i % ew);
+            counts.iter_mut().zip(px).for_each(|(counts, code)| counts[code as usize] += 1);
+        }
+        counts
+    };
+    let masses = (0..(eh * ew).div_ceil(step))
+        .into_par_iter()
+        .with_min_len(1 << 14)
+        .fold(|| NOTHING, count)
+        .reduce(
+            || NOTHING,
+            |mut a, b| {
+                let all = a.as_flattened_mut().iter_mut().zip(b.as_flattened());
+                all.for_each(|(a, b)| *a += b);
+                a
+            },
+        )
+        .map(|counts| counts.map(f64::from).to_vec());
     // If the step has missed the few usable pixels, any usable patch's first pixel will do.
     let distribution = |k: usize| {
         Distribution::from_masses(&masses[k]).unwrap_or_else(|| {
