@@ -4,7 +4,7 @@ use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
 use crate::image::color::{ColorModel, MatchSpace};
 use crate::image::mask::Mask;
-use crate::image::picture::Picture;
+use crate::image::picture::{Encoding, Picture, Samples};
 use crate::method::stationary::{CONTRAST, Plan};
 use rayon::prelude::*;
 
@@ -108,9 +108,11 @@ pub(super) struct Level {
     pub(super) usage_unit: f32,
     /// What rare places cost.
     pub(super) rarity: PlaceCost,
+    /// The exemplar as a picture, if somebody watches.
+    pub(super) exemplar: Option<Picture>,
 }
 
-/// All levels, finest first.
+/// All levels, finest first; with their exemplars as pictures if they are `watched`.
 ///
 /// # Errors
 /// [`Error::EmptyMask`] if no whole patch is usable at full size.
@@ -119,6 +121,7 @@ pub(super) fn build(
     photo: &Picture,
     mask: Option<&Mask>,
     plan: &Plan,
+    watched: bool,
 ) -> Result<Vec<Level>> {
     let (h, w) = plan.size;
     let (mut eh, mut ew) = (photo.height(), photo.width());
@@ -156,7 +159,10 @@ pub(super) fn build(
             plan.patch,
             &mut codes,
         ) {
-            Some(level) => levels.push(level),
+            Some(level) => {
+                let exemplar = watched.then(|| shown(&pixels, model.space(), (eh, ew)));
+                levels.push(Level { exemplar: exemplar.transpose()?, ..level });
+            }
             // A thin mask leaves no patch at coarse levels: start with finer ones.
             None if j > 0 => break,
             None => return Err(Error::EmptyMask { usable: n_usable, patch: plan.patch }),
@@ -256,7 +262,16 @@ fn level(
         .sum();
     let usage_unit = (USAGE_SHARE * variance * (patch * patch) as f64) as f32;
     let rarity = PlaceCost::free(&source);
-    Some(Level { size, source, quantiles, usage_unit, rarity })
+    Some(Level { size, source, quantiles, usage_unit, rarity, exemplar: None })
+}
+
+/// Averaging pixels as a picture that has the same colours to match.
+fn shown(pixels: &[[f32; 3]], space: MatchSpace, (h, w): (usize, usize)) -> Result<Picture> {
+    let encoding = match space {
+        MatchSpace::Lab => Encoding::Linear,
+        MatchSpace::Data => Encoding::Data,
+    };
+    Picture::new(h, w, 3, Samples::F32(pixels.as_flattened().to_vec()), encoding)
 }
 
 /// The exemplar's typical local histogram of each colour: the median over all places of each
