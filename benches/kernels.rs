@@ -23,7 +23,8 @@ use texforge::search::field::{Field, Pos};
 use texforge::search::patch::{
     Kernel, MatchImage, WithKernel, detected, distance_squared, with_kernel,
 };
-use texforge::search::patchmatch::{Search, Usage, Wrap, distances, pass};
+use texforge::search::patchmatch::{Search, Wrap, distances, pass};
+use texforge::search::place_cost::PlaceCost;
 use texforge::search::seams::{self, Canvas};
 use texforge::search::source::Source;
 use texforge::search::vote::vote;
@@ -151,7 +152,7 @@ fn patch_distances(bench: &mut Bench) {
 struct Scene {
     source: Source,
     target: MatchImage,
-    usage: Usage,
+    usage: PlaceCost,
     wrap: Wrap,
     search: Search,
     field: Field,
@@ -179,7 +180,7 @@ impl Scene {
             std::array::from_fn(|k| px[k] + noise[k] % 4)
         });
         let field = if coherent { quilt } else { Field::random(SIDE, SIDE, &source, 6) };
-        let usage = Usage::of(&field, &source, 500.0);
+        let usage = PlaceCost::of_usage(&field, &source, 500.0);
         let search = Search { pass: 0, radius: 32, n_random: 2 };
         Self { source, target, usage, wrap: TORUS, search, field }
     }
@@ -213,7 +214,7 @@ impl Scene {
     }
 
     /// Sum of the scores that the search minimizes, without the usage (which is kept equal by
-    /// `Usage::free` where this is asserted).
+    /// `PlaceCost::free` where this is asserted).
     fn cost(&self, field: &Field) -> i64 {
         let each = distances(Simd::default(), &self.target, &self.source, field);
         each.into_iter().map(i64::from).sum()
@@ -224,7 +225,7 @@ fn passes(bench: &mut Bench, ctx: &Ctx) {
     let mut group = bench.benchmark_group("PatchMatch pass 512x512");
     for (name, coherent) in [("coherent field", true), ("random field", false)] {
         let mut scene = Scene::new(coherent);
-        let usage = std::mem::replace(&mut scene.usage, Usage::free(&scene.source));
+        let usage = std::mem::replace(&mut scene.usage, PlaceCost::free(&scene.source));
         let before = distances(Simd::default(), &scene.target, &scene.source, &scene.field);
         let after = distances(Simd::default(), &scene.target, &scene.source, &scene.pass(ctx));
         assert!(before.iter().zip(&after).all(|(b, a)| a <= b), "{name}: a match got worse");

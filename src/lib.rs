@@ -32,7 +32,8 @@ pub use image::material::MapKind;
 pub use image::picture::{Encoding, Picture, Samples};
 pub use image::sigma_map::SigmaMap;
 pub use image::sourcemap::SourceMap;
+pub use verb::texture_cost::{TextureCost, TextureCostParams, texture_cost};
 pub use verb::tile::{
-    Axis, Costs, Guides, Measure, Method, Quality, Report, Size, Tile, TileParams, tile,
+    Axis, Costs, Guides, Measure, Method, Quality, Report, Size, Step, Tile, TileParams, tile,
     tile_guided,
 };

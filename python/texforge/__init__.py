@@ -2,7 +2,9 @@
 
 `tile` makes a texture that repeats from a casual photo; the `Tile` it returns holds the picture
 and says which pixel of the photo each of its pixels is, so that other maps of the same material
-can follow (`apply`). `read_image` and `write_image` keep all the bits that files have.
+can follow (`apply`). `texture_cost` measures how much a texture looks like its photo.
+`read_image` and `write_image` keep all the bits that files have. `study` compares the ways to
+tile over many photos.
 Everything raised on purpose is a `TexforgeError`.
 """
 
@@ -22,6 +24,8 @@ from texforge._errors import (
     SameFileError,
     TexforgeError,
 )
+from texforge._measure import texture_cost
+from texforge._study import Study, study
 from texforge._texforge import __version__
 from texforge._types import (
     Axis,
@@ -37,6 +41,8 @@ from texforge._types import (
     ProgressBar,
     Quality,
     SourceMap,
+    Step,
+    TextureCost,
     Tile,
 )
 
@@ -66,12 +72,17 @@ __all__ = [
     "ReadError",
     "SameFileError",
     "SourceMap",
+    "Step",
+    "Study",
     "TexforgeError",
+    "TextureCost",
     "Tile",
     "__version__",
     "apply",
     "load_source_map",
     "read_image",
+    "study",
+    "texture_cost",
     "tile",
     "write_image",
 ]

@@ -25,6 +25,7 @@ from texforge._types import (
     Progress,
     Quality,
     SourceMap,
+    Step,
     Tile,
 )
 
@@ -45,6 +46,7 @@ def tile(
     sigma: float = 0.1,
     patch: int = 11,
     uniformity: float = 1.0,
+    rarity: float = 1.0,
     quality: Quality = "normal",
     seed: int = 0,
     mask: ImageLike | None = None,
@@ -53,6 +55,7 @@ def tile(
     encoding: Encoding | Literal["auto"] = "auto",
     threads: int | None = None,
     progress: Progress = None,
+    trace: bool = False,
 ) -> Tile:
     """Turn a photo into a texture that repeats without a seam and without a giveaway blob.
 
@@ -87,6 +90,9 @@ def tile(
         features whole, smaller mixes more.
     uniformity : float
         How strongly every part of the photo is made to contribute equally, 0 (not at all) to 100.
+    rarity : float
+        How strongly single things that catch the eye (a leaf, a nail, a dark spot) are held
+        back, 0 (not at all) to 4. For the method ``"stationary"``.
     quality : {"draft", "normal", "best"}
         How much time to spend.
     seed : int
@@ -114,6 +120,9 @@ def tile(
         True shows a tqdm bar. A function is called on this thread, with the fraction done from
         0.0 to 1.0; returning False cancels, and exceptions pass through. An object with
         ``update``, such as ``tqdm.tqdm(total=1.0)``, is moved on.
+    trace : bool
+        Whether to measure the costs of every iteration, as `Tile.trace`. The pixels are the same;
+        it takes longer.
 
     Returns
     -------
@@ -157,14 +166,15 @@ def tile(
     photo = _arrays.picture(image, "the photo", encoding)
     params = {
         "size": _size_text(size),
-        "axis": _word("axis", axis),
-        "method": _word("method", method),
-        "measure": _word("measure", measure),
+        "axis": _arrays.word("axis", axis),
+        "method": _arrays.word("method", method),
+        "measure": _arrays.word("measure", measure),
         "order": str(_arrays.integer("order", order)),
         "sigma": _number("sigma", sigma),
         "patch": str(_arrays.integer("patch", patch)),
         "uniformity": _number("uniformity", uniformity),
-        "quality": _word("quality", quality),
+        "rarity": _number("rarity", rarity),
+        "quality": _arrays.word("quality", quality),
     }
     if maps and method == "make-seamless":
         raise ParameterError(
@@ -175,7 +185,7 @@ def tile(
     others = {name: _map(other, name) for name, other in (maps or {}).items()}
     kinds = {name: _texforge.map_kind(name) for name in others}
     with reporting(progress) as callback:
-        picture_out, map_out, maps_out, report_text = _texforge.tile(
+        picture_out, map_out, maps_out, report_text, steps = _texforge.tile(
             photo=photo.packed(),
             mask=None if mask is None else _arrays.mask(mask).packed(),
             sigma_map=None
@@ -186,6 +196,7 @@ def tile(
             seed=_arrays.integer("seed", seed),
             threads=_arrays.integer("threads", threads or 0, high=1024),
             progress=callback,
+            trace=bool(trace),
         )
     report = json.loads(report_text)
     report["notes"] = [*report["notes"], *photo.notes]
@@ -199,6 +210,7 @@ def tile(
         maps={name: others[name].unpacked(parts) for name, parts in maps_out},
         encoding=_arrays.array_encoding(picture_out[3]),
         photo_size=(photo.array.shape[0], photo.array.shape[1]),
+        trace=[Step(level, i, texture or 0.0, even) for level, i, texture, even in steps],
     )
 
 
@@ -253,9 +265,9 @@ def apply(
     if source_size is None:
         source_size = (other.array.shape[0], other.array.shape[1])
     out = _texforge.apply(
-        source_map=_packed_map(positions, source_size),
+        source_map=_arrays.packed_map(positions, source_size),
         picture=other.packed(),
-        kind=_word("kind", kind),
+        kind=_arrays.word("kind", kind),
     )
     return other.unpacked(out)
 
@@ -287,7 +299,7 @@ def read_image(path: PathType, *, kind: MapKind = "color") -> Image:
     OutOfMemory
         If the picture would not fit into memory.
     """
-    parts = _texforge.read(path=_arrays.path(path), kind=_word("kind", kind))
+    parts = _texforge.read(path=_arrays.path(path), kind=_arrays.word("kind", kind))
     array = _arrays.unpacked(parts)
     flat = array[:, :, 0] if array.shape[2] == 1 else array
     return Image.tagged(flat, _arrays.array_encoding(parts[3]))
@@ -338,7 +350,7 @@ def write_image(
     _texforge.write(
         path=_arrays.path(path),
         picture=picture.packed(),
-        kind=_word("kind", kind),
+        kind=_arrays.word("kind", kind),
         record=None,
         overwrite=bool(overwrite),
     )
@@ -371,7 +383,7 @@ def load_source_map(path: PathType) -> SourceMap:
 def save_source_map(tile: Tile, path: PathType, *, overwrite: bool) -> None:
     """See `Tile.save_source_map`."""
     source_map = _source_map_of(tile)
-    packed = _packed_map(_arrays.positions(source_map.positions), source_map.source_size)
+    packed = _arrays.packed_map(_arrays.positions(source_map.positions), source_map.source_size)
     _texforge.write_source_map(
         path=_arrays.path(path), source_map=packed, overwrite=bool(overwrite)
     )
@@ -441,19 +453,6 @@ def _positions(parts: tuple[bytearray, tuple[int, int], tuple[int, int]]) -> npt
     return np.frombuffer(data, dtype=np.int32).reshape(height, width, 2)
 
 
-def _packed_map(
-    positions: npt.NDArray[np.int32], source_size: object
-) -> tuple[Any, tuple[int, int], tuple[int, int]]:
-    if not isinstance(source_size, tuple | list) or len(source_size) != 2:
-        raise ParameterError(
-            f"`source_size` must be (height, width), got {source_size!r}",
-            fields={"name": "source_size"},
-        )
-    height, width = (_arrays.integer("source_size", side, 1, 2**31) for side in source_size)
-    shape = (positions.shape[0], positions.shape[1])
-    return positions.reshape(-1).view(np.uint8), shape, (height, width)
-
-
 def _size_text(size: object) -> str:
     if size is None:
         return "auto"
@@ -464,12 +463,6 @@ def _size_text(size: object) -> str:
         )
     height, width = (_arrays.integer("size", side, 1) for side in sides)
     return f"{width}x{height}"
-
-
-def _word(name: str, value: object) -> str:
-    if not isinstance(value, str):
-        raise ParameterError(f"`{name}` must be a word, got {value!r}", fields={"name": name})
-    return value
 
 
 def _number(name: str, value: Any) -> str:

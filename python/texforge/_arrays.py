@@ -160,6 +160,20 @@ def positions(source_map: Any) -> npt.NDArray[np.int32]:
     return np.ascontiguousarray(array, dtype=np.int32)
 
 
+def packed_map(
+    positions: npt.NDArray[np.int32], source_size: object
+) -> tuple[Any, tuple[int, int], tuple[int, int]]:
+    """Return a source map as the parts that the core takes."""
+    if not isinstance(source_size, tuple | list) or len(source_size) != 2:
+        raise ParameterError(
+            f"`source_size` must be (height, width), got {source_size!r}",
+            fields={"name": "source_size"},
+        )
+    height, width = (integer("source_size", side, 1, 2**31) for side in source_size)
+    shape = (positions.shape[0], positions.shape[1])
+    return positions.reshape(-1).view(np.uint8), shape, (height, width)
+
+
 def integer(name: str, value: Any, low: int = 0, high: int = 2**64 - 1) -> int:
     """Return an argument that must be an integer in a range."""
     try:
@@ -172,6 +186,13 @@ def integer(name: str, value: Any, low: int = 0, high: int = 2**64 - 1) -> int:
             fields={"name": name},
         )
     return number
+
+
+def word(name: str, value: object) -> str:
+    """Return an argument that must be a word."""
+    if not isinstance(value, str):
+        raise ParameterError(f"`{name}` must be a word, got {value!r}", fields={"name": name})
+    return value
 
 
 def path(value: Any) -> str:

@@ -1,4 +1,4 @@
-"""The `texforge` command of the wheel: the same program as the stand-alone one."""
+"""The `texforge` command of the wheel: the stand-alone program, and `study`."""
 
 from __future__ import annotations
 
@@ -15,6 +15,11 @@ def main() -> int:
     """Run the command line with `sys.argv`; return the exit status."""
     sys.stdout.flush()
     sys.stderr.flush()
+    if sys.argv[1:2] == ["study"]:
+        # The one command that is written in Python; its packages are not loaded for the others.
+        from texforge._study import command
+
+        return command.main(sys.argv)
     if threading.current_thread() is not threading.main_thread():
         return _texforge.cli_main(sys.argv)
     # Python only notes Ctrl-C and raises later, in code that does not run meanwhile. With the

@@ -7,11 +7,13 @@ _Picture = tuple[Any, str, tuple[int, int, int], str]
 _PictureOut = tuple[bytearray, str, tuple[int, int, int], str]
 _Map = tuple[Any, tuple[int, int], tuple[int, int]]
 _MapOut = tuple[bytearray, tuple[int, int], tuple[int, int]]
+_Step = tuple[int, int, float | None, float]
 
 __all__ = [
     "__version__",
     "apply",
     "cli_main",
+    "cli_study",
     "encode_png",
     "error_kinds",
     "fail",
@@ -19,6 +21,7 @@ __all__ = [
     "read",
     "read_source_map",
     "schema",
+    "texture_cost",
     "tile",
     "write",
     "write_source_map",
@@ -36,7 +39,19 @@ def tile(
     seed: int,
     threads: int,
     progress: Callable[[float], object] | None,
-) -> tuple[_PictureOut, _MapOut | None, list[tuple[str, _PictureOut]], str]: ...
+    trace: bool,
+) -> tuple[_PictureOut, _MapOut | None, list[tuple[str, _PictureOut]], str, list[_Step]]: ...
+def texture_cost(
+    *,
+    texture: _Picture,
+    photo: _Picture,
+    source_map: _Map | None,
+    mask: _Picture | None,
+    params: list[tuple[str, str]],
+    seed: int,
+    threads: int,
+    progress: Callable[[float], object] | None,
+) -> tuple[float, float, int]: ...
 def apply(*, source_map: _Map, picture: _Picture, kind: str) -> _PictureOut: ...
 def read(*, path: str, kind: str) -> _PictureOut: ...
 def write(
@@ -46,7 +61,8 @@ def encode_png(*, picture: _Picture) -> bytes: ...
 def read_source_map(*, path: str) -> _MapOut: ...
 def write_source_map(*, path: str, source_map: _Map, overwrite: bool) -> None: ...
 def map_kind(name: str) -> str: ...
-def schema() -> list[dict[str, Any]]: ...
+def schema(verb: str = "tile") -> list[dict[str, Any]]: ...
 def error_kinds() -> list[str]: ...
 def fail(kind: str) -> None: ...
 def cli_main(args: list[str]) -> int: ...
+def cli_study(args: list[str]) -> tuple[int, dict[str, Any] | None]: ...

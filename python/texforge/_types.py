@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 from os import PathLike
-from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -27,6 +27,8 @@ __all__ = [
     "ProgressBar",
     "Quality",
     "SourceMap",
+    "Step",
+    "TextureCost",
     "Tile",
 ]
 
@@ -131,6 +133,56 @@ class Costs:
         return f"{texture}stationarity cost {self.stationarity:.3g}"
 
 
+@dataclasses.dataclass(frozen=True)
+class TextureCost:
+    """The texture cost by its definition, estimated from a random sample: see `texture_cost`.
+
+    Attributes
+    ----------
+    mean : float
+        Mean squared CIE L*a*b* distance, per pixel of a patch, between the texture's patches and
+        the nearest of all the photo's patches; an estimate of the mean over all patches, with a
+        bias far below its margin.
+    margin : float
+        Half the width of the 95 % confidence interval around `mean`; 0 if nothing was left
+        to chance.
+    samples : int
+        How many patches were compared with all of the photo's. Fewer than were asked for if there
+        are no more whose cost is not known to be 0 from where the tile's pixels come from.
+    """
+
+    mean: float
+    margin: float
+    samples: int
+
+
+class Step(NamedTuple):
+    """What an iteration has come to: one line of `Tile.trace`.
+
+    The costs are those of `Tile.costs`, for the tile that would have been delivered if the work
+    had stopped here, before seams are settled: its pixels are the middles of the matched patches.
+    They are measured at the level's resolution: `texture` against the photo at that level,
+    `stationarity` with a window that is a fraction of the level's own size.
+
+    Attributes
+    ----------
+    level : int
+        Level of the pyramid: 0 has the tile's size, every further one is smaller by 1.3.
+    iteration : int
+        Iteration at this level, from 1. The last of level 0 is the finished tile, and has exactly
+        its `costs`: one more than there are iterations, as seams are settled after them.
+    texture : float
+        Texture cost, in squared CIE L*a*b* units.
+    stationarity : float
+        Stationarity cost, in CIE L*a*b* units.
+    """
+
+    level: int
+    iteration: int
+    texture: float
+    stationarity: float
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class SourceMap:
     """Where every pixel of a texture comes from.
@@ -189,6 +241,9 @@ class Tile:
         What the numbers of `image` mean.
     photo_size : (int, int)
         Height and width of the photo.
+    trace : list of Step
+        The costs of every iteration, coarse to fine, if ``trace=True`` was asked for; else, and
+        with the method ``"make-seamless"``, which has no iterations, empty.
     """
 
     image: npt.NDArray[Any]
@@ -200,6 +255,7 @@ class Tile:
     maps: dict[str, npt.NDArray[Any]]
     encoding: Encoding
     photo_size: tuple[int, int]
+    trace: list[Step]
 
     def apply(self, image: ImageLike, *, kind: MapKind = "data") -> npt.NDArray[Any]:
         """Make another map of the photo's material match the tile.

@@ -1,4 +1,5 @@
 //! Room 4: numbers about one picture.
 
+pub mod nearest;
 pub mod stationarity;
 pub mod texture;

@@ -7,7 +7,7 @@ use clap::{Arg, ArgAction, ArgMatches, Command, ValueHint, value_parser};
 
 use crate::base::error::Result;
 use crate::base::params::Param;
-use crate::cli::maps;
+use crate::cli::{maps, study};
 use crate::verb::tile::TileParams;
 
 const TILE_EXAMPLES: &str = "\
@@ -41,6 +41,7 @@ pub(super) fn command() -> Command {
         .arg_required_else_help(true)
         .subcommand(tile())
         .subcommand(apply())
+        .subcommand(study::command())
         .subcommand(
             Command::new("params")
                 .about("Lists the parameters of a command: meaning, default, range.")
@@ -77,7 +78,7 @@ pub(super) fn command() -> Command {
                 .arg(
                     Arg::new("verb")
                         .value_name("COMMAND")
-                        .value_parser(["tile", "apply", "params", "info", "completions"])
+                        .value_parser(["tile", "apply", "study", "params", "info", "completions"])
                         .help("The page of this command"),
                 ),
         )
@@ -220,7 +221,7 @@ pub(super) fn tile_params(matches: &ArgMatches) -> Result<TileParams> {
     Ok(params)
 }
 
-fn file(id: &'static str, value_name: &'static str, help: &'static str) -> Arg {
+pub(super) fn file(id: &'static str, value_name: &'static str, help: &'static str) -> Arg {
     Arg::new(id)
         .value_name(value_name)
         .value_parser(value_parser!(PathBuf))
@@ -228,11 +229,11 @@ fn file(id: &'static str, value_name: &'static str, help: &'static str) -> Arg {
         .help(help)
 }
 
-fn switch(name: &'static str, help: &'static str) -> Arg {
+pub(super) fn switch(name: &'static str, help: &'static str) -> Arg {
     Arg::new(name).long(name).action(ArgAction::SetTrue).help(help)
 }
 
-fn json() -> Arg {
+pub(super) fn json() -> Arg {
     switch("json", "Write one JSON object to standard output")
 }
 

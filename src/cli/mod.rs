@@ -12,6 +12,7 @@ mod output;
 mod preview;
 mod show;
 mod small;
+pub mod study;
 mod tile;
 mod work;
 
@@ -41,6 +42,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
         "info" => small::info(matches),
         "completions" => small::completions(matches),
         "man" => small::man(matches),
+        "study" => return study::elsewhere(),
         other => Err(Error::Internal { message: format!("command {other} is not connected") }),
     };
     match result {

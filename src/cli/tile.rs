@@ -206,8 +206,9 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Str
     session.check()?;
 
     // The long work.
-    let guides = Guides { mask: mask.as_ref(), sigma_map: sigma_map.as_ref() };
-    let Tile { picture, source_map, report } = tile_guided(ctx, &photo, guides, &request.params)?;
+    let guides = Guides { mask: mask.as_ref(), sigma_map: sigma_map.as_ref(), trace: false };
+    let Tile { picture, source_map, report, .. } =
+        tile_guided(ctx, &photo, guides, &request.params)?;
     notes.extend(report.notes.iter().cloned());
 
     // Encode and stage every file; the maps follow the tile.

@@ -23,7 +23,9 @@ use crate::image::material::{self, MapKind};
 use crate::image::picture::Picture;
 use crate::image::sigma_map::SigmaMap;
 use crate::image::sourcemap::SourceMap;
-use crate::verb::tile::{Guides, TileParams};
+use crate::verb::texture_cost as measure;
+use crate::verb::texture_cost::TextureCostParams;
+use crate::verb::tile::{Guides, Step, TileParams, tile_guided};
 use array::{ArrayIn, ArrayOut, MapIn, MapOut, array_out, map_out};
 use error::IntoPy;
 
@@ -51,14 +53,18 @@ fn ensure_same_shape(name: &str, map: &Picture, photo: &Picture) -> Result<()> {
     }
 }
 
-/// Makes a tile. Returns the picture, the source map, the gathered maps and the report as JSON.
+/// A line of a tile's trace: level, iteration, texture cost, stationarity cost.
+type StepOut = (usize, u32, Option<f64>, f64);
+
+/// Makes a tile. Returns the picture, the source map, the gathered maps, the report as JSON and the
+/// trace.
 #[pyfunction]
 #[expect(
     clippy::too_many_arguments,
     reason = "one private caller, in _api.py, passes them by name"
 )]
 #[expect(clippy::type_complexity, reason = "one private caller, in _api.py, names its parts")]
-#[pyo3(signature = (*, photo, mask, sigma_map, maps, params, seed, threads, progress))]
+#[pyo3(signature = (*, photo, mask, sigma_map, maps, params, seed, threads, progress, trace))]
 fn tile<'py>(
     py: Python<'py>,
     photo: ArrayIn<'py>,
@@ -69,17 +75,21 @@ fn tile<'py>(
     seed: u64,
     threads: usize,
     progress: Option<Bound<'py, PyAny>>,
-) -> PyResult<(ArrayOut<'py>, Option<MapOut<'py>>, Vec<(String, ArrayOut<'py>)>, String)> {
+    trace: bool,
+) -> PyResult<(
+    ArrayOut<'py>,
+    Option<MapOut<'py>>,
+    Vec<(String, ArrayOut<'py>)>,
+    String,
+    Vec<StepOut>,
+)> {
     let mut settings = TileParams::default();
     for (name, text) in &params {
         settings.set(name, text).into_py(py)?;
     }
     settings.validate().into_py(py)?;
     let photo = photo.picture(py)?;
-    let mask = match mask {
-        Some(mask) => Some(Mask::from_picture(&mask.picture(py)?).into_py(py)?),
-        None => None,
-    };
+    let mask = mask.map(|mask| mask_of(py, &mask)).transpose()?;
     let sigma_map = match sigma_map {
         Some(map) => Some(SigmaMap::from_picture(&map.picture(py)?).into_py(py)?),
         None => None,
@@ -93,8 +103,8 @@ fn tile<'py>(
     let ctx = Ctx::new(seed, threads).into_py(py)?;
     let job = ctx.job();
     let (tile, gathered) = enter::enter(py, &job, progress.as_ref(), move || {
-        let guides = Guides { mask: mask.as_ref(), sigma_map: sigma_map.as_ref() };
-        let tile = crate::verb::tile::tile_guided(&ctx, &photo, guides, &settings)?;
+        let guides = Guides { mask: mask.as_ref(), sigma_map: sigma_map.as_ref(), trace };
+        let tile = tile_guided(&ctx, &photo, guides, &settings)?;
         let mut gathered = Vec::with_capacity(others.len());
         if let Some(source_map) = &tile.source_map {
             for (name, map, kind) in others {
@@ -111,7 +121,46 @@ fn tile<'py>(
         .into_iter()
         .map(|(name, picture)| Ok((name, array_out(py, &picture)?)))
         .collect::<PyResult<_>>()?;
-    Ok((array_out(py, &tile.picture)?, source_map, maps, report))
+    let step = |s: &Step| (s.level, s.iteration, s.costs.texture, s.costs.stationarity);
+    let trace = tile.trace.iter().map(step).collect();
+    Ok((array_out(py, &tile.picture)?, source_map, maps, report, trace))
+}
+
+fn mask_of(py: Python<'_>, mask: &ArrayIn<'_>) -> PyResult<Mask> {
+    Mask::from_picture(&mask.picture(py)?).into_py(py)
+}
+
+/// Measures the exact texture cost on a sample. Returns mean, margin and number of samples.
+#[pyfunction]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "one private caller, in _api.py, passes them by name"
+)]
+#[pyo3(signature = (*, texture, photo, source_map, mask, params, seed, threads, progress))]
+fn texture_cost<'py>(
+    py: Python<'py>,
+    texture: ArrayIn<'py>,
+    photo: ArrayIn<'py>,
+    source_map: Option<MapIn<'py>>,
+    mask: Option<ArrayIn<'py>>,
+    params: Vec<(String, String)>,
+    seed: u64,
+    threads: usize,
+    progress: Option<Bound<'py, PyAny>>,
+) -> PyResult<(f64, f64, usize)> {
+    let mut settings = TextureCostParams::default();
+    for (name, text) in &params {
+        settings.set(name, text).into_py(py)?;
+    }
+    let (texture, photo) = (texture.picture(py)?, photo.picture(py)?);
+    let map = source_map.map(|map| map.source_map(py)).transpose()?;
+    let mask = mask.map(|mask| mask_of(py, &mask)).transpose()?;
+    let ctx = Ctx::new(seed, threads).into_py(py)?;
+    let job = ctx.job();
+    let cost = enter::enter(py, &job, progress.as_ref(), move || {
+        measure::texture_cost(&ctx, &texture, &photo, map.as_ref(), mask.as_ref(), &settings)
+    })?;
+    Ok((cost.mean, cost.margin, cost.samples))
 }
 
 /// Gathers a map through a source map.
@@ -196,9 +245,10 @@ fn map_kind(name: &str) -> &'static str {
     }
 }
 
-/// Every parameter of `tile`, with its default as text.
+/// Every parameter of a verb (`texture_cost`, else `tile`), with its default as text.
 #[pyfunction]
-fn schema(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
+#[pyo3(signature = (verb = "tile"))]
+fn schema<'py>(py: Python<'py>, verb: &str) -> PyResult<Vec<Bound<'py, PyDict>>> {
     let entry = |param: crate::base::params::Param| {
         let dict = PyDict::new(py);
         dict.set_item("name", param.name)?;
@@ -210,7 +260,11 @@ fn schema(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
         dict.set_item("doc", param.doc)?;
         Ok(dict)
     };
-    TileParams::schema().into_iter().map(entry).collect()
+    let params = match verb {
+        TextureCostParams::VERB => TextureCostParams::schema(),
+        _ => TileParams::schema(),
+    };
+    params.into_iter().map(entry).collect()
 }
 
 /// The slug of every kind of error.
@@ -232,13 +286,34 @@ fn cli_main(py: Python<'_>, args: Vec<OsString>) -> u8 {
     py.detach(|| std::panic::catch_unwind(|| crate::cli::run(args)).unwrap_or(1))
 }
 
+/// Reads the command line of `study`; returns what was asked for, or the exit status if there is
+/// nothing to do.
+#[pyfunction]
+fn cli_study(py: Python<'_>, args: Vec<OsString>) -> PyResult<(u8, Option<Bound<'_, PyDict>>)> {
+    let request = match crate::cli::study::request(args) {
+        Ok(request) => request,
+        Err(status) => return Ok((status, None)),
+    };
+    let dict = PyDict::new(py);
+    dict.set_item("folder", request.folder)?;
+    dict.set_item("out", request.output)?;
+    dict.set_item("seeds", request.seeds)?;
+    dict.set_item("size", request.size)?;
+    dict.set_item("measures", request.measures)?;
+    dict.set_item("samples", request.samples)?;
+    dict.set_item("threads", request.threads)?;
+    dict.set_item("json", request.json)?;
+    dict.set_item("quiet", request.quiet)?;
+    Ok((0, Some(dict)))
+}
+
 /// The private module.
 #[pymodule(gil_used = false)]
 mod _texforge {
     #[pymodule_export]
     use super::{
-        apply, cli_main, encode_png, error_kinds, fail, map_kind, read, read_source_map, schema,
-        tile, write, write_source_map,
+        apply, cli_main, cli_study, encode_png, error_kinds, fail, map_kind, read, read_source_map,
+        schema, texture_cost, tile, write, write_source_map,
     };
 
     use pyo3::prelude::*;

@@ -1,6 +1,6 @@
 //! [`tile`]: a photo becomes a texture that repeats.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
@@ -133,6 +133,8 @@ params! {
         patch: usize = 11, in 3..=21, unit "px";
         /// How strongly every part of the photo is made to contribute equally; 0 switches it off.
         uniformity: f32 = 1.0, in 0.0..=100.0;
+        /// How strongly single things that catch the eye (a leaf, a nail, a dark spot) are held back; 0 treats them like the rest. For the method stationary.
+        rarity: f32 = 1.0, in 0.0..=4.0;
         /// How much time to spend.
         quality: Quality = Quality::Normal;
     }
@@ -178,6 +180,22 @@ pub struct Report {
     pub notes: Vec<String>,
 }
 
+/// What an iteration has come to: one line of [`Tile::trace`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Step {
+    /// Level of the pyramid: 0 has the tile's size, every further one is smaller by 1.3.
+    pub level: usize,
+    /// Iteration at this level, from 1. The last of level 0 is the delivered tile: one more than
+    /// there are iterations, as the seams are settled after them.
+    pub iteration: u32,
+    /// The costs, as [`Report::costs`] has them, of the tile that would have been delivered if the
+    /// work had stopped here before the seams are settled: the middles of the matched patches.
+    /// Texture is compared with the photo at the level's resolution, and the window of the
+    /// stationarity cost is a fraction of the level's own size. On the last line they are those of
+    /// the report.
+    pub costs: Costs,
+}
+
 /// The result of [`tile`].
 #[derive(Debug, Clone)]
 pub struct Tile {
@@ -188,6 +206,9 @@ pub struct Tile {
     pub source_map: Option<SourceMap>,
     /// How it was made and what it costs.
     pub report: Report,
+    /// The costs of every iteration, coarse to fine; empty unless [`Guides::trace`] is set, and with
+    /// [`Method::MakeSeamless`], which has no iterations.
+    pub trace: Vec<Step>,
 }
 
 impl TileParams {
@@ -239,10 +260,10 @@ impl TileParams {
 /// [`Error::EmptyMask`], [`Error::SizeMismatch`] (mask), [`Error::NotFinite`], [`Error::Memory`]
 /// (checked before anything is allocated), [`Error::Cancelled`].
 pub fn tile(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, params: &TileParams) -> Result<Tile> {
-    tile_guided(ctx, photo, Guides { mask, sigma_map: None }, params)
+    tile_guided(ctx, photo, Guides { mask, ..Guides::default() }, params)
 }
 
-/// Pictures that guide [`tile_guided`].
+/// What [`tile_guided`] may be given besides the photo.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Guides<'a> {
     /// Where the photo may be used; of the photo's size.
@@ -250,6 +271,9 @@ pub struct Guides<'a> {
     /// How far the measure reaches at every pixel, in place of `sigma`; of the tile's size. The
     /// histogram's cost is measured with `sigma` still, that of the measure in use with the map.
     pub sigma_map: Option<&'a SigmaMap>,
+    /// Whether every iteration's costs are measured too, see [`Tile::trace`]. Same bytes; the time
+    /// that takes is listed apart in [`Report::seconds`].
+    pub trace: bool,
 }
 
 /// [`tile`], with further pictures that say what is wanted where.
@@ -266,7 +290,7 @@ pub fn tile_guided(
     guides: Guides<'_>,
     params: &TileParams,
 ) -> Result<Tile> {
-    let Guides { mask, sigma_map } = guides;
+    let Guides { mask, sigma_map, trace: traced } = guides;
     let start = Instant::now();
     let (width, height) = check(photo, sigma_map, params)?;
     let size = (height, width);
@@ -282,15 +306,27 @@ pub fn tile_guided(
         notes.push("nothing is made stationary; the sigma map changes no pixel".to_owned());
     }
 
+    let mut trace = Vec::new();
+    let mut tracing = Duration::ZERO;
+    let mut look = |look: &stationary::Look<'_>| {
+        let since = Instant::now();
+        let picture = look.map.apply(look.exemplar, MapKind::Color)?;
+        let costs = costs(look.exemplar, &picture, Some(&look.map), params, sigma_map, wrap);
+        trace.push(Step { level: look.level, iteration: look.iteration, costs });
+        tracing += since.elapsed();
+        Ok(())
+    };
+    let watch: Option<stationary::Watch<'_>> = if traced { Some(&mut look) } else { None };
     let (picture, source_map) = ctx.install(|| {
         if params.method == Method::MakeSeamless {
             return Ok((make_seamless::run(photo, size, wrap)?, None));
         }
         let plan = plan(params, sigma_map, size, wrap);
-        let map = stationary::run(ctx, photo, mask.as_ref(), &plan)?;
+        let map = stationary::run(ctx, photo, mask.as_ref(), &plan, watch)?;
         Ok((map.apply(photo, MapKind::Color)?, Some(map)))
     })?;
     let made = start.elapsed();
+    let synthesis = made.saturating_sub(tracing);
     let costs =
         ctx.install(|| Ok(costs(photo, &picture, source_map.as_ref(), params, sigma_map, wrap)))?;
     let mut resolved = params.clone();
@@ -302,13 +338,17 @@ pub fn tile_guided(
         photo_size: (photo.width(), photo.height()),
         tile_size: (width, height),
         costs,
-        seconds: vec![
-            ("synthesis", made.as_secs_f64()),
-            ("costs", start.elapsed().saturating_sub(made).as_secs_f64()),
-        ],
+        seconds: [
+            Some(("synthesis", synthesis.as_secs_f64())),
+            traced.then_some(("trace", tracing.as_secs_f64())),
+            Some(("costs", start.elapsed().saturating_sub(made).as_secs_f64())),
+        ]
+        .into_iter()
+        .flatten()
+        .collect(),
         notes,
     };
-    Ok(Tile { picture, source_map, report })
+    Ok(Tile { picture, source_map, report, trace })
 }
 
 /// Checks everything that can be known before the work; returns the tile's width and height.
@@ -369,7 +409,7 @@ fn check(
 }
 
 /// Where the photo may be used: the caller's mask and the photo's own alpha; `None` is everywhere.
-fn usable_mask(photo: &Picture, mask: Option<&Mask>) -> Result<Option<Mask>> {
+pub(super) fn usable_mask(photo: &Picture, mask: Option<&Mask>) -> Result<Option<Mask>> {
     if let Some(mask) = mask {
         mask.ensure_size(photo.height(), photo.width())?;
     }
@@ -400,6 +440,7 @@ fn plan(
         evenness: params.evenness(sigma_map).filter(|_| even),
         patch: params.patch,
         uniformity: params.uniformity,
+        rarity: if even { params.rarity } else { 0.0 },
         coarse_iterations,
         fine_iterations,
     }

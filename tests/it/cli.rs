@@ -488,3 +488,10 @@ mod interruption {
         end(&["tile", "photo.png", "-o", "-", "--size", "48", "--quality", "draft"]);
     }
 }
+
+#[test]
+fn the_study_is_in_the_python_package() {
+    let folder = Folder::with_photo();
+    folder.refuses(&["study", ".", "-o", "out"], 1, "`study` comes with the Python package");
+    folder.refuses(&["study", ".", "-o", "out", "--seeds", "0"], 2, "--seeds");
+}

@@ -1,6 +1,7 @@
 //! The one integration test binary; a module per subject.
 
 mod cli;
+mod costs;
 mod golden;
 mod house;
 mod io;

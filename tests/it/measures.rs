@@ -171,7 +171,7 @@ mod sigma_map {
     }
 
     fn guided(photo: &Picture, map: &SigmaMap, seed: u64, params: &TileParams) -> Tile {
-        let guides = Guides { mask: None, sigma_map: Some(map) };
+        let guides = Guides { sigma_map: Some(map), ..Guides::default() };
         let ctx = Ctx::new(seed, 2).expect("pool");
         tile_guided(&ctx, photo, guides, params).expect("a tile")
     }
@@ -222,7 +222,7 @@ mod sigma_map {
             let run = |threads: usize, simd: Simd| {
                 let mut ctx = Ctx::new(3, threads).expect("pool");
                 ctx.simd = simd;
-                let guides = Guides { mask: None, sigma_map: Some(&map) };
+                let guides = Guides { sigma_map: Some(&map), ..Guides::default() };
                 let tile = tile_guided(&ctx, &photo, guides, &params).expect("a tile");
                 (tile.picture, tile.report.costs)
             };
@@ -237,7 +237,7 @@ mod sigma_map {
     fn a_map_of_another_size_is_refused() {
         let photo = grain(64, 64, 1).picture();
         let map = map(31, |_| 0.1);
-        let guides = Guides { mask: None, sigma_map: Some(&map) };
+        let guides = Guides { sigma_map: Some(&map), ..Guides::default() };
         let ctx = Ctx::new(0, 1).expect("pool");
         let params = params(Measure::Histogram, 2, 32);
         let error = tile_guided(&ctx, &photo, guides, &params).expect_err("refused");

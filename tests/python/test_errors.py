@@ -74,6 +74,7 @@ PARAMETERS: dict[str, dict[str, Any]] = {
     "sigma infinite": {"sigma": float("inf")},
     "sigma text": {"sigma": "wide"},
     "uniformity": {"uniformity": -1},
+    "rarity": {"rarity": 5},
     "method": {"method": "magic"},
     "measure": {"measure": 3},
     "order zero": {"measure": "moments", "order": 0},

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import inspect
 import typing
+from collections.abc import Callable  # noqa: TC003 (resolved at run time)
 
+import pytest
 import texforge
 from texforge import _texforge
 
 
-def test_names_order_and_defaults_are_those_of_the_core() -> None:
-    signature = inspect.signature(texforge.tile)
+@pytest.mark.parametrize("function", [texforge.tile, texforge.texture_cost])
+def test_names_order_and_defaults_are_those_of_the_core(function: Callable[..., object]) -> None:
+    signature = inspect.signature(function)
     options = [p for p in signature.parameters.values() if p.kind is p.KEYWORD_ONLY]
-    schema = _texforge.schema()
+    schema = _texforge.schema(function.__name__)
+    assert schema
     assert [p.name for p in options][: len(schema)] == [entry["name"] for entry in schema]
     for option, entry in zip(options, schema, strict=False):
         shown = "auto" if option.default is None else option.default
@@ -38,16 +42,18 @@ def test_everything_but_the_picture_is_keyword_only() -> None:
             assert (parameter.kind is parameter.KEYWORD_ONLY) == optional, parameter
 
 
-def test_every_parameter_is_documented() -> None:
-    doc = inspect.getdoc(texforge.tile)
+@pytest.mark.parametrize("function", [texforge.tile, texforge.texture_cost])
+def test_every_parameter_is_documented(function: Callable[..., object]) -> None:
+    doc = inspect.getdoc(function)
     assert doc is not None
-    for name in inspect.signature(texforge.tile).parameters:
+    for name in inspect.signature(function).parameters:
         assert f"\n{name} : " in doc
 
 
-def test_ranges_in_the_docs_are_those_of_the_core() -> None:
-    doc = " ".join((inspect.getdoc(texforge.tile) or "").split())
-    for entry in _texforge.schema():
+@pytest.mark.parametrize("function", [texforge.tile, texforge.texture_cost])
+def test_ranges_in_the_docs_are_those_of_the_core(function: Callable[..., object]) -> None:
+    doc = " ".join((inspect.getdoc(function) or "").split())
+    for entry in _texforge.schema(function.__name__):
         if entry["range"]:
             low, high = entry["range"].split(" to ")
             text = doc[doc.index(f" {entry['name']} : ") :][:260]

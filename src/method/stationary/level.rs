@@ -4,12 +4,14 @@ use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
 use crate::image::color::{ColorModel, MatchSpace};
 use crate::image::mask::Mask;
-use crate::image::picture::Picture;
+use crate::image::picture::{Encoding, Picture, Samples};
 use crate::method::stationary::{CONTRAST, Plan};
 use rayon::prelude::*;
 
 use crate::search::field::Pos;
 use crate::search::patch::{CODE_MAX, MatchImage};
+use crate::search::place_cost::PlaceCost;
+use crate::search::rarity::rarity;
 use crate::search::source::Source;
 use crate::signal::histogram::{Distribution, Quantiles, SOFT_BITS, Soft};
 use crate::signal::localhist::LocalDistributions;
@@ -32,6 +34,10 @@ const TYPICAL_WINDOW: f64 = 0.15;
 /// Cost of using a patch as often as the average, as a share of the patch's own variance. More
 /// drives neighbouring pixels to different places of the photo, and the vote blurs.
 const USAGE_SHARE: f64 = 0.024;
+
+/// Shorter side of the largest level at which rare places are looked for. A patch then spans a
+/// twentieth of the photo; what is smaller than a tenth of a patch here, nobody notices in a tile.
+const RARITY_SIDE: usize = 256;
 
 /// Affine map from L*a*b* to 7-bit codes, the same scale for all channels, so that distances of
 /// codes are Euclidean distances of colours.
@@ -100,9 +106,13 @@ pub(super) struct Level {
     pub(super) quantiles: [Quantiles; 4],
     /// Uniformity cost of using a patch as often as the average, in squared codes.
     pub(super) usage_unit: f32,
+    /// What rare places cost.
+    pub(super) rarity: PlaceCost,
+    /// The exemplar as a picture, if somebody watches.
+    pub(super) exemplar: Option<Picture>,
 }
 
-/// All levels, finest first.
+/// All levels, finest first; with their exemplars as pictures if they are `watched`.
 ///
 /// # Errors
 /// [`Error::EmptyMask`] if no whole patch is usable at full size.
@@ -111,6 +121,7 @@ pub(super) fn build(
     photo: &Picture,
     mask: Option<&Mask>,
     plan: &Plan,
+    watched: bool,
 ) -> Result<Vec<Level>> {
     let (h, w) = plan.size;
     let (mut eh, mut ew) = (photo.height(), photo.width());
@@ -148,7 +159,10 @@ pub(super) fn build(
             plan.patch,
             &mut codes,
         ) {
-            Some(level) => levels.push(level),
+            Some(level) => {
+                let exemplar = watched.then(|| shown(&pixels, model.space(), (eh, ew)));
+                levels.push(Level { exemplar: exemplar.transpose()?, ..level });
+            }
             // A thin mask leaves no patch at coarse levels: start with finer ones.
             None if j > 0 => break,
             None => return Err(Error::EmptyMask { usable: n_usable, patch: plan.patch }),
@@ -164,7 +178,23 @@ pub(super) fn build(
             }
         }
     }
+    if plan.rarity > 0.0 {
+        rate(ctx, &mut levels);
+    }
     Ok(levels)
+}
+
+/// Finds what is rare at the coarse levels; the finer ones take it over.
+fn rate(ctx: &Ctx, levels: &mut [Level]) {
+    let mut coarser: Option<PlaceCost> = None;
+    for level in levels.iter_mut().rev() {
+        let side = level.source.rows().min(level.source.cols());
+        level.rarity = match coarser {
+            Some(coarser) if side > RARITY_SIDE => coarser.resized(&level.source),
+            _ => rarity(ctx, &level.source),
+        };
+        coarser = Some(level.rarity.clone());
+    }
 }
 
 fn level(
@@ -231,7 +261,17 @@ fn level(
         })
         .sum();
     let usage_unit = (USAGE_SHARE * variance * (patch * patch) as f64) as f32;
-    Some(Level { size, source, quantiles, usage_unit })
+    let rarity = PlaceCost::free(&source);
+    Some(Level { size, source, quantiles, usage_unit, rarity, exemplar: None })
+}
+
+/// Averaging pixels as a picture that has the same colours to match.
+fn shown(pixels: &[[f32; 3]], space: MatchSpace, (h, w): (usize, usize)) -> Result<Picture> {
+    let encoding = match space {
+        MatchSpace::Lab => Encoding::Linear,
+        MatchSpace::Data => Encoding::Data,
+    };
+    Picture::new(h, w, 3, Samples::F32(pixels.as_flattened().to_vec()), encoding)
 }
 
 /// The exemplar's typical local histogram of each colour: the median over all places of each

@@ -15,7 +15,8 @@ use crate::image::sigma_map::SigmaMap;
 use crate::image::sourcemap::SourceMap;
 use crate::search::field::{Field, Pos};
 use crate::search::patch::MatchImage;
-use crate::search::patchmatch::{self, Search, Usage, Wrap};
+use crate::search::patchmatch::{self, Search, Wrap};
+use crate::search::place_cost::PlaceCost;
 use crate::search::seams;
 use crate::search::vote::{Votes, vote};
 use crate::signal::histogram::{Distribution, SOFT_BITS};
@@ -54,6 +55,8 @@ pub struct Plan {
     pub patch: usize,
     /// Weight of spatial uniformity.
     pub uniformity: f32,
+    /// How much rare places cost, as a share of what they are rarer than others.
+    pub rarity: f32,
     /// Iterations at the coarsest level.
     pub coarse_iterations: u32,
     /// Iterations at each other level.
@@ -91,12 +94,35 @@ impl Evenness {
     }
 }
 
-/// Synthesizes a texture from `photo`: where every output pixel comes from.
+/// A look at the work: the tile that would be delivered if it stopped here, at its level's size.
+#[derive(Debug)]
+pub struct Look<'a> {
+    /// Number of the level; 0 has the output's size, every further one is smaller by 1.3.
+    pub level: usize,
+    /// Iterations done at this level. The last look of all counts one more: the seams are settled.
+    pub iteration: u32,
+    /// The photo at this level, as three channels of linear light (or data).
+    pub exemplar: &'a Picture,
+    /// Which of the exemplar's pixels each of the tile's is.
+    pub map: SourceMap,
+}
+
+/// Is shown every iteration; an error from it ends the work.
+pub type Watch<'a> = &'a mut (dyn FnMut(&Look<'_>) -> Result<()> + Send);
+
+/// Synthesizes a texture from `photo`: where every output pixel comes from. Watching changes
+/// nothing in it.
 ///
 /// # Errors
-/// See [`tile`](crate::tile).
-pub fn run(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, plan: &Plan) -> Result<SourceMap> {
-    let levels = level::build(ctx, photo, mask, plan)?;
+/// See [`tile`](crate::tile); those of `watch`.
+pub fn run(
+    ctx: &Ctx,
+    photo: &Picture,
+    mask: Option<&Mask>,
+    plan: &Plan,
+    mut watch: Option<Watch<'_>>,
+) -> Result<SourceMap> {
+    let levels = level::build(ctx, photo, mask, plan, watch.is_some())?;
     let n_coarse = levels.len() - 1;
     let area = |l: &Level| (l.size.0 * l.size.1) as u64;
     let work = levels
@@ -113,7 +139,7 @@ pub fn run(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, plan: &Plan) -> Resu
             Some(coarse) => coarse.upsampled(h, w, &level.source, ctx.seed),
         };
         let coarsest = j == n_coarse;
-        let mut usage = Usage::of(&f, &level.source, plan.uniformity * level.usage_unit);
+        let mut usage = PlaceCost::of_usage(&f, &level.source, plan.uniformity * level.usage_unit);
         let (iterations, search) = effort(plan, level, coarsest);
         let apron = |wrap: bool| if wrap { 0 } else { plan.patch - 1 };
         let domain = Domain {
@@ -138,19 +164,23 @@ pub fn run(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, plan: &Plan) -> Resu
                 evenness.statistic.project(&mut votes.soft, domain, window, projection);
             }
             let target = canvas(&votes, plan, (h, w));
-            let now = Usage::of(&f, &level.source, plan.uniformity * level.usage_unit);
+            let now = PlaceCost::of_usage(&f, &level.source, plan.uniformity * level.usage_unit);
             usage = now.averaged(&usage);
+            let cost = usage.clone().plus(plan.rarity, &level.rarity);
             let search = Search { pass, ..search };
-            patchmatch::pass(ctx, &target, &level.source, &usage, plan.wrap, search, &mut f)?;
+            patchmatch::pass(ctx, &target, &level.source, &cost, plan.wrap, search, &mut f)?;
             pass += 1;
+            if let (Some(watch), Some(exemplar)) = (watch.as_mut(), &level.exemplar) {
+                let from = (exemplar.height(), exemplar.width());
+                let map = SourceMap::new((h, w), from, centers(&f, plan.patch))?;
+                watch(&Look { level: j, iteration: i + 1, exemplar, map })?;
+            }
         }
         field = Some(f);
     }
     let field = field.expect("there is at least one level");
-    let half = plan.patch / 2;
     let finest = &levels[0];
-    let center = |p: &Pos| [(p.y() + half) as u32, (p.x() + half) as u32];
-    let mut yx: Vec<seams::From> = field.pos.iter().map(center).collect();
+    let mut yx = centers(&field, plan.patch);
     let votes = vote(ctx.simd, &field, &finest.source, plan.wrap);
     let canvas = seams::Canvas {
         source: &finest.source.image,
@@ -159,7 +189,19 @@ pub fn run(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, plan: &Plan) -> Resu
         wrap: plan.wrap,
     };
     seams::settle(ctx, &canvas, &mut yx, SEAM_SWEEPS)?;
-    SourceMap::new(plan.size, (photo.height(), photo.width()), yx)
+    let map = SourceMap::new(plan.size, (photo.height(), photo.width()), yx)?;
+    if let (Some(watch), Some(exemplar)) = (watch, &finest.exemplar) {
+        let coarsest = levels.len() == 1;
+        let iteration = effort(plan, finest, coarsest).0 + 1;
+        watch(&Look { level: 0, iteration, exemplar, map: map.clone() })?;
+    }
+    Ok(map)
+}
+
+/// The pixel in the middle of each matched patch.
+fn centers(field: &Field, patch: usize) -> Vec<seams::From> {
+    let half = patch / 2;
+    field.pos.iter().map(|p: &Pos| [(p.y() + half) as u32, (p.x() + half) as u32]).collect()
 }
 
 /// Peak memory of [`run`] besides the photo itself, for a photo and an output of these sizes
