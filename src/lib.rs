@@ -30,8 +30,10 @@ pub use base::error::{Error, ErrorKind, Result};
 pub use image::mask::Mask;
 pub use image::material::MapKind;
 pub use image::picture::{Encoding, Picture, Samples};
+pub use image::sigma_map::SigmaMap;
 pub use image::sourcemap::SourceMap;
 pub use verb::texture_cost::{TextureCost, TextureCostParams, texture_cost};
 pub use verb::tile::{
-    Axis, Costs, Measure, Method, Quality, Report, Size, Step, Tile, TileParams, tile, tile_traced,
+    Axis, Costs, Guides, Measure, Method, Quality, Report, Size, Step, Tile, TileParams, tile,
+    tile_guided,
 };

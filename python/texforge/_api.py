@@ -42,12 +42,15 @@ def tile(
     axis: Axis = "both",
     method: Method = "stationary",
     measure: Measure = "histogram",
+    order: int = 2,
     sigma: float = 0.1,
     patch: int = 11,
     uniformity: float = 1.0,
+    rarity: float = 1.0,
     quality: Quality = "normal",
     seed: int = 0,
     mask: ImageLike | None = None,
+    sigma_map: ImageLike | None = None,
     maps: Mapping[str, ImageLike] | None = None,
     encoding: Encoding | Literal["auto"] = "auto",
     threads: int | None = None,
@@ -72,8 +75,13 @@ def tile(
         In which directions the tile repeats: ``"x"`` horizontally only, ``"y"`` vertically only.
     method : {"stationary", "wrap-only", "no-wrap", "make-seamless"}
         How the tile is made. All but the first are baselines to compare with.
-    measure : {"histogram", "none"}
-        The statistic that is made equal everywhere in the tile.
+    measure : {"histogram", "moments", "steerable", "none"}
+        The statistic that is made equal everywhere in the tile: the histograms of the colours,
+        their moments, or the histograms of the responses to filters of four orientations, which
+        know fine structure but no shades.
+    order : int
+        With the measure ``"moments"``, how many of them, 1 to 4: the mean, the variance, the
+        skewness, the kurtosis.
     sigma : float
         Reach of the measure, as a fraction of the tile's shorter side, 0.01 to 1. Smaller evens
         out smaller stains, larger keeps more variety.
@@ -82,12 +90,19 @@ def tile(
         features whole, smaller mixes more.
     uniformity : float
         How strongly every part of the photo is made to contribute equally, 0 (not at all) to 100.
+    rarity : float
+        How strongly single things that catch the eye (a leaf, a nail, a dark spot) are held
+        back, 0 (not at all) to 4. For the method ``"stationary"``.
     quality : {"draft", "normal", "best"}
         How much time to spend.
     seed : int
         Seed of all random choices, 0 to 2**64 - 1.
     mask : (H, W) array_like, or Pillow image, optional
         Where the photo may be used: True, or at least half of full scale (128 of 255).
+    sigma_map : (H', W') array_like, or Pillow image, optional
+        Sigma at every pixel of the tile (and of its size), in place of `sigma`. Floats are sigma
+        itself, 0.01 to 1. Of integers black is 0.01, half of full scale 0.1 and white 1, in even
+        factors. ``costs.stationarity`` is measured with `sigma` still.
     maps : mapping of str to array_like, optional
         Other maps of the same material by name, to be tiled the same way. The name decides what
         a map is: base colour and emission are colours, normals are vectors (and come out with
@@ -154,9 +169,11 @@ def tile(
         "axis": _arrays.word("axis", axis),
         "method": _arrays.word("method", method),
         "measure": _arrays.word("measure", measure),
+        "order": str(_arrays.integer("order", order)),
         "sigma": _number("sigma", sigma),
         "patch": str(_arrays.integer("patch", patch)),
         "uniformity": _number("uniformity", uniformity),
+        "rarity": _number("rarity", rarity),
         "quality": _arrays.word("quality", quality),
     }
     if maps and method == "make-seamless":
@@ -171,6 +188,9 @@ def tile(
         picture_out, map_out, maps_out, report_text, steps = _texforge.tile(
             photo=photo.packed(),
             mask=None if mask is None else _arrays.mask(mask).packed(),
+            sigma_map=None
+            if sigma_map is None
+            else _arrays.picture(sigma_map, "the sigma map", "data").packed(),
             maps=[(name, other.packed(), kinds[name]) for name, other in others.items()],
             params=list(params.items()),
             seed=_arrays.integer("seed", seed),

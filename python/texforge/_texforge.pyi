@@ -33,6 +33,7 @@ def tile(
     *,
     photo: _Picture,
     mask: _Picture | None,
+    sigma_map: _Picture | None,
     maps: list[tuple[str, _Picture, str]],
     params: list[tuple[str, str]],
     seed: int,

@@ -103,6 +103,11 @@ fn tile() -> Command {
                 .long("mask"),
         )
         .arg(
+            file("sigma-map", "FILE", "Grey picture of the tile's size that says sigma at every pixel, in place of \
+                 --sigma: floats are sigma itself, of integers black is 0.01, mid grey 0.1 and white 1, in even factors")
+                .long("sigma-map"),
+        )
+        .arg(
             Arg::new("map")
                 .long("map")
                 .value_name("NAME=FILE")

@@ -10,6 +10,7 @@ use serde::{Serialize, Serializer};
 
 use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
+use crate::base::params::Value;
 use crate::cli::maps::{self, Wanted};
 use crate::cli::output::{Target, to_stdout};
 use crate::cli::show::duration;
@@ -19,7 +20,10 @@ use crate::cli::{args, files, preview};
 use crate::image::mask::Mask;
 use crate::image::material::{MapKind, Sibling};
 use crate::image::picture::Picture;
-use crate::verb::tile::{Costs, Method, Report, Size, Tile, TileParams, tile};
+use crate::image::sigma_map::SigmaMap;
+use crate::verb::tile::{
+    Costs, Guides, Measure, Method, Report, Size, Tile, TileParams, tile_guided,
+};
 
 /// What was typed, checked as far as it can be without looking at a file.
 #[derive(Debug)]
@@ -28,6 +32,7 @@ struct Request {
     target: Target,
     params: TileParams,
     mask: Option<PathBuf>,
+    sigma_map: Option<PathBuf>,
     maps: Vec<Wanted>,
     pick_up: bool,
     source_map: Option<PathBuf>,
@@ -127,6 +132,7 @@ impl Request {
             target,
             params,
             mask: path("mask"),
+            sigma_map: path("sigma-map"),
             maps,
             source_map,
             preview,
@@ -136,7 +142,8 @@ impl Request {
 
     fn inputs(&self) -> Vec<&Path> {
         let maps = self.maps.iter().map(|m| m.path.as_path());
-        maps.chain([self.photo.as_path()]).chain(self.mask.as_deref()).collect()
+        let guides = self.mask.as_deref().into_iter().chain(self.sigma_map.as_deref());
+        maps.chain([self.photo.as_path()]).chain(guides).collect()
     }
 
     /// Fails if an output cannot be written, or two outputs are the same file.
@@ -189,14 +196,19 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Str
             Some(mask)
         }
     };
+    let sigma_map = match &request.sigma_map {
+        None => None,
+        Some(path) => Some(SigmaMap::from_picture(&files::read(path, MapKind::Data)?)?),
+    };
     let maps = read_maps(session, request, &photo, &mut notes)?;
     request.check_outputs(&maps)?;
     files::ensure_can_hold(&photo, request.target.file(), MapKind::Color)?;
     session.check()?;
 
     // The long work.
+    let guides = Guides { mask: mask.as_ref(), sigma_map: sigma_map.as_ref(), trace: false };
     let Tile { picture, source_map, report, .. } =
-        tile(ctx, &photo, mask.as_ref(), &request.params)?;
+        tile_guided(ctx, &photo, guides, &request.params)?;
     notes.extend(report.notes.iter().cloned());
 
     // Encode and stage every file; the maps follow the tile.
@@ -393,10 +405,14 @@ fn line(request: &Request, report: &Report, elapsed: Duration) -> String {
         Target::Stdout => "standard output".into(),
         Target::File(path) => path.display().to_string(),
     };
-    let Costs { texture, stationarity } = report.costs;
+    let Costs { texture, stationarity, stationarity_by_measure } = report.costs;
     let texture = texture.map_or(String::new(), |cost| format!("texture cost {cost:.2}, "));
+    let measure = request.params.measure;
+    let by_measure = stationarity_by_measure
+        .filter(|_| measure != Measure::Histogram)
+        .map_or(String::new(), |cost| format!(" (by {}: {cost:.3})", measure.show()));
     format!(
-        "{place}  {w}x{h}{why}, seed {}, {}, {texture}stationarity cost {stationarity:.2}",
+        "{place}  {w}x{h}{why}, seed {}, {}, {texture}stationarity cost {stationarity:.2}{by_measure}",
         report.seed,
         duration(elapsed),
     )

@@ -5,4 +5,5 @@ pub mod io;
 pub mod mask;
 pub mod material;
 pub mod picture;
+pub mod sigma_map;
 pub mod sourcemap;

@@ -21,11 +21,11 @@ use crate::image::io::{self, Format, WriteOptions};
 use crate::image::mask::Mask;
 use crate::image::material::{self, MapKind};
 use crate::image::picture::Picture;
+use crate::image::sigma_map::SigmaMap;
 use crate::image::sourcemap::SourceMap;
 use crate::verb::texture_cost as measure;
 use crate::verb::texture_cost::TextureCostParams;
-use crate::verb::tile as verb;
-use crate::verb::tile::TileParams;
+use crate::verb::tile::{Guides, Step, TileParams, tile_guided};
 use array::{ArrayIn, ArrayOut, MapIn, MapOut, array_out, map_out};
 use error::IntoPy;
 
@@ -64,11 +64,12 @@ type StepOut = (usize, u32, Option<f64>, f64);
     reason = "one private caller, in _api.py, passes them by name"
 )]
 #[expect(clippy::type_complexity, reason = "one private caller, in _api.py, names its parts")]
-#[pyo3(signature = (*, photo, mask, maps, params, seed, threads, progress, trace))]
+#[pyo3(signature = (*, photo, mask, sigma_map, maps, params, seed, threads, progress, trace))]
 fn tile<'py>(
     py: Python<'py>,
     photo: ArrayIn<'py>,
     mask: Option<ArrayIn<'py>>,
+    sigma_map: Option<ArrayIn<'py>>,
     maps: Vec<NamedMap<'py>>,
     params: Vec<(String, String)>,
     seed: u64,
@@ -89,6 +90,10 @@ fn tile<'py>(
     settings.validate().into_py(py)?;
     let photo = photo.picture(py)?;
     let mask = mask.map(|mask| mask_of(py, &mask)).transpose()?;
+    let sigma_map = match sigma_map {
+        Some(map) => Some(SigmaMap::from_picture(&map.picture(py)?).into_py(py)?),
+        None => None,
+    };
     let mut others = Vec::with_capacity(maps.len());
     for (name, map, kind) in &maps {
         let map = map.picture(py)?;
@@ -98,8 +103,8 @@ fn tile<'py>(
     let ctx = Ctx::new(seed, threads).into_py(py)?;
     let job = ctx.job();
     let (tile, gathered) = enter::enter(py, &job, progress.as_ref(), move || {
-        let make = if trace { verb::tile_traced } else { verb::tile };
-        let tile = make(&ctx, &photo, mask.as_ref(), &settings)?;
+        let guides = Guides { mask: mask.as_ref(), sigma_map: sigma_map.as_ref(), trace };
+        let tile = tile_guided(&ctx, &photo, guides, &settings)?;
         let mut gathered = Vec::with_capacity(others.len());
         if let Some(source_map) = &tile.source_map {
             for (name, map, kind) in others {
@@ -116,7 +121,7 @@ fn tile<'py>(
         .into_iter()
         .map(|(name, picture)| Ok((name, array_out(py, &picture)?)))
         .collect::<PyResult<_>>()?;
-    let step = |s: &verb::Step| (s.level, s.iteration, s.costs.texture, s.costs.stationarity);
+    let step = |s: &Step| (s.level, s.iteration, s.costs.texture, s.costs.stationarity);
     let trace = tile.trace.iter().map(step).collect();
     Ok((array_out(py, &tile.picture)?, source_map, maps, report, trace))
 }

@@ -2,4 +2,7 @@
 
 pub mod histogram;
 pub mod localhist;
+pub mod measure;
 pub mod resample;
+pub mod steerable;
+pub mod window;

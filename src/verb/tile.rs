@@ -13,10 +13,12 @@ use crate::image::color::ColorModel;
 use crate::image::mask::Mask;
 use crate::image::material::MapKind;
 use crate::image::picture::Picture;
+use crate::image::sigma_map::SigmaMap;
 use crate::image::sourcemap::SourceMap;
 use crate::method::{make_seamless, stationary};
 use crate::search::patchmatch::Wrap;
-use crate::signal::localhist::Domain;
+use crate::signal::measure::{ORDERS, Statistic};
+use crate::signal::window::Domain;
 
 /// Longest side of a tile, in pixels.
 const MAX_TILE_SIDE: usize = 32_768;
@@ -89,8 +91,12 @@ choice! {
 choice! {
     /// The statistic that is made equal everywhere.
     pub enum Measure {
-        /// Local histograms of each colour channel.
+        /// Local histograms of each colour channel: the whole distribution.
         Histogram = "histogram",
+        /// Local moments of each colour channel: mean, variance and so on, up to `order`.
+        Moments = "moments",
+        /// Local histograms of oriented filters' responses: only fine structure, no shades.
+        Steerable = "steerable",
         /// None: the same as the method `wrap-only`.
         None = "none",
     }
@@ -119,12 +125,16 @@ params! {
         method: Method = Method::Stationary;
         /// The statistic that is made equal everywhere in the tile.
         measure: Measure = Measure::Histogram;
+        /// With the measure moments, how many of them: 1 the mean, 2 and the variance, 3 and the skewness, 4 and the kurtosis.
+        order: usize = 2, in 1..=4;
         /// Reach of the stationarity measure: smaller evens out smaller stains, larger keeps more variety.
         sigma: f32 = 0.1, in 0.01..=1.0, unit "fraction of the tile's shorter side";
         /// Side of the patches that are compared; odd. Larger keeps larger features whole, smaller mixes more.
         patch: usize = 11, in 3..=21, unit "px";
         /// How strongly every part of the photo is made to contribute equally; 0 switches it off.
         uniformity: f32 = 1.0, in 0.0..=100.0;
+        /// How strongly single things that catch the eye (a leaf, a nail, a dark spot) are held back; 0 treats them like the rest. For the method stationary.
+        rarity: f32 = 1.0, in 0.0..=4.0;
         /// How much time to spend.
         quality: Quality = Quality::Normal;
     }
@@ -141,6 +151,12 @@ pub struct Costs {
     /// Stationarity cost: mean earth mover's distance between the local histograms of two places,
     /// summed over L*, a* and b* (paper eq. 1 and 3), in L*a*b* units.
     pub stationarity: f64,
+    /// The cost under the measure of the parameters: the same number for the histogram; for the
+    /// moments, the mean squared difference of two places' moments (of values counted from the
+    /// mean in tens of units), in L*a*b* units squared (paper eq. 2); for the steerable filters,
+    /// the earth mover's distance summed over twelve responses, in L*a*b* units (paper eq. 4).
+    /// `None` without a measure. Comparable between tiles of the same measure and order only.
+    pub stationarity_by_measure: Option<f64>,
 }
 
 /// How a tile was made and what it costs.
@@ -190,7 +206,7 @@ pub struct Tile {
     pub source_map: Option<SourceMap>,
     /// How it was made and what it costs.
     pub report: Report,
-    /// The costs of every iteration, coarse to fine; empty unless made by [`tile_traced`], and with
+    /// The costs of every iteration, coarse to fine; empty unless [`Guides::trace`] is set, and with
     /// [`Method::MakeSeamless`], which has no iterations.
     pub trace: Vec<Step>,
 }
@@ -212,6 +228,18 @@ impl TileParams {
         }
         (pow2(w.min(h)), pow2(w.min(h)))
     }
+
+    /// What `measure`, `order` and `sigma`, or the map in its place, say.
+    fn evenness(&self, sigma_map: Option<&SigmaMap>) -> Option<stationary::Evenness> {
+        let statistic = match self.measure {
+            Measure::Histogram => Statistic::Histogram,
+            Measure::Moments => Statistic::Moments(ORDERS[self.order - 1]),
+            Measure::Steerable => Statistic::Steerable,
+            Measure::None => return None,
+        };
+        let sigma_map = sigma_map.cloned();
+        Some(stationary::Evenness { statistic, sigma: self.sigma, sigma_map })
+    }
 }
 
 /// Turns a photo into a tile that repeats without a seam and without a blob that gives the
@@ -232,32 +260,39 @@ impl TileParams {
 /// [`Error::EmptyMask`], [`Error::SizeMismatch`] (mask), [`Error::NotFinite`], [`Error::Memory`]
 /// (checked before anything is allocated), [`Error::Cancelled`].
 pub fn tile(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, params: &TileParams) -> Result<Tile> {
-    make(ctx, photo, mask, params, false)
+    tile_guided(ctx, photo, Guides { mask, ..Guides::default() }, params)
 }
 
-/// As [`tile`], the same bytes; but every iteration's costs are measured too, see [`Tile::trace`].
-/// The time that takes is listed apart in [`Report::seconds`].
+/// What [`tile_guided`] may be given besides the photo.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Guides<'a> {
+    /// Where the photo may be used; of the photo's size.
+    pub mask: Option<&'a Mask>,
+    /// How far the measure reaches at every pixel, in place of `sigma`; of the tile's size. The
+    /// histogram's cost is measured with `sigma` still, that of the measure in use with the map.
+    pub sigma_map: Option<&'a SigmaMap>,
+    /// Whether every iteration's costs are measured too, see [`Tile::trace`]. Same bytes; the time
+    /// that takes is listed apart in [`Report::seconds`].
+    pub trace: bool,
+}
+
+/// [`tile`], with further pictures that say what is wanted where.
+///
+/// # Paper
+/// Moritz et al. 2017, Fig. 10: a locally prescribed reach. Statistics are computed under windows of a
+/// few sizes and their mappings blended at every pixel.
 ///
 /// # Errors
-/// As [`tile`].
-pub fn tile_traced(
+/// Those of [`tile`]; [`Error::SizeMismatch`] (sigma map).
+pub fn tile_guided(
     ctx: &Ctx,
     photo: &Picture,
-    mask: Option<&Mask>,
+    guides: Guides<'_>,
     params: &TileParams,
 ) -> Result<Tile> {
-    make(ctx, photo, mask, params, true)
-}
-
-fn make(
-    ctx: &Ctx,
-    photo: &Picture,
-    mask: Option<&Mask>,
-    params: &TileParams,
-    traced: bool,
-) -> Result<Tile> {
+    let Guides { mask, sigma_map, trace: traced } = guides;
     let start = Instant::now();
-    let (width, height) = check(photo, params)?;
+    let (width, height) = check(photo, sigma_map, params)?;
     let size = (height, width);
     let wrap = Wrap { y: params.axis != Axis::X, x: params.axis != Axis::Y };
     let mask = usable_mask(photo, mask)?;
@@ -265,13 +300,18 @@ fn make(
     if mask.is_some() && params.method == Method::MakeSeamless {
         notes.push("the method make-seamless uses the whole photo; the mask is ignored".to_owned());
     }
+    if sigma_map.is_some()
+        && (params.method != Method::Stationary || params.measure == Measure::None)
+    {
+        notes.push("nothing is made stationary; the sigma map changes no pixel".to_owned());
+    }
 
     let mut trace = Vec::new();
     let mut tracing = Duration::ZERO;
     let mut look = |look: &stationary::Look<'_>| {
         let since = Instant::now();
         let picture = look.map.apply(look.exemplar, MapKind::Color)?;
-        let costs = costs(look.exemplar, &picture, Some(&look.map), params, wrap);
+        let costs = costs(look.exemplar, &picture, Some(&look.map), params, sigma_map, wrap);
         trace.push(Step { level: look.level, iteration: look.iteration, costs });
         tracing += since.elapsed();
         Ok(())
@@ -281,13 +321,14 @@ fn make(
         if params.method == Method::MakeSeamless {
             return Ok((make_seamless::run(photo, size, wrap)?, None));
         }
-        let plan = plan(params, size, wrap);
+        let plan = plan(params, sigma_map, size, wrap);
         let map = stationary::run(ctx, photo, mask.as_ref(), &plan, watch)?;
         Ok((map.apply(photo, MapKind::Color)?, Some(map)))
     })?;
     let made = start.elapsed();
     let synthesis = made.saturating_sub(tracing);
-    let costs = ctx.install(|| Ok(costs(photo, &picture, source_map.as_ref(), params, wrap)))?;
+    let costs =
+        ctx.install(|| Ok(costs(photo, &picture, source_map.as_ref(), params, sigma_map, wrap)))?;
     let mut resolved = params.clone();
     resolved.size = Size::Pixels { width, height };
     let report = Report {
@@ -311,10 +352,18 @@ fn make(
 }
 
 /// Checks everything that can be known before the work; returns the tile's width and height.
-fn check(photo: &Picture, params: &TileParams) -> Result<(usize, usize)> {
+fn check(
+    photo: &Picture,
+    sigma_map: Option<&SigmaMap>,
+    params: &TileParams,
+) -> Result<(usize, usize)> {
     params.validate()?;
     if params.patch.is_multiple_of(2) {
         return Err(Error::parameter("patch", "odd, so that a patch has a middle", params.patch));
+    }
+    if params.measure != Measure::Moments && params.order != TileParams::default().order {
+        let expected = "left out unless the measure is `moments`";
+        return Err(Error::parameter("order", expected, params.order));
     }
     let (width, height) = params.resolved_size(photo.width(), photo.height());
     let sides = 1..=MAX_TILE_SIDE;
@@ -346,8 +395,15 @@ fn check(photo: &Picture, params: &TileParams) -> Result<(usize, usize)> {
         ));
     }
     photo.ensure_finite("the photo")?;
+    if let Some(map) = sigma_map {
+        map.ensure_size(height, width)?;
+    }
+    // A filtered channel is eleven planes of floats; a sigma map has up to eight planes of weights.
+    let filtered = if params.measure == Measure::Steerable { 44 } else { 0 };
+    let mapped = if sigma_map.is_some() { 48 } else { 0 };
+    let pixel = filtered + mapped + (photo.byte_len() / (pw * ph)) as u64;
     let need = stationary::memory_bytes((ph, pw), (height, width))
-        .checked_add((width * height) as u64 * (photo.byte_len() / (pw * ph)) as u64);
+        .checked_add((width * height) as u64 * pixel);
     ensure_available(&format!("a {width}x{height} tile from a {pw}x{ph} photo"), need)?;
     Ok((width, height))
 }
@@ -365,8 +421,13 @@ pub(super) fn usable_mask(photo: &Picture, mask: Option<&Mask>) -> Result<Option
     Ok(both.filter(|m| m.count() < m.usable().len()))
 }
 
-fn plan(params: &TileParams, size: (usize, usize), wrap: Wrap) -> stationary::Plan {
-    let even = params.method == Method::Stationary && params.measure != Measure::None;
+fn plan(
+    params: &TileParams,
+    sigma_map: Option<&SigmaMap>,
+    size: (usize, usize),
+    wrap: Wrap,
+) -> stationary::Plan {
+    let even = params.method == Method::Stationary;
     let wraps = params.method != Method::NoWrap;
     let (coarse_iterations, fine_iterations) = match params.quality {
         Quality::Draft => (12, 1),
@@ -376,9 +437,10 @@ fn plan(params: &TileParams, size: (usize, usize), wrap: Wrap) -> stationary::Pl
     stationary::Plan {
         size,
         wrap: Wrap { y: wrap.y && wraps, x: wrap.x && wraps },
-        sigma: even.then_some(params.sigma),
+        evenness: params.evenness(sigma_map).filter(|_| even),
         patch: params.patch,
         uniformity: params.uniformity,
+        rarity: if even { params.rarity } else { 0.0 },
         coarse_iterations,
         fine_iterations,
     }
@@ -389,6 +451,7 @@ fn costs(
     picture: &Picture,
     map: Option<&SourceMap>,
     params: &TileParams,
+    sigma_map: Option<&SigmaMap>,
     wrap: Wrap,
 ) -> Costs {
     let model = ColorModel::new(photo);
@@ -397,8 +460,14 @@ fn costs(
     let (height, width) = (picture.height(), picture.width());
     let domain = Domain { height, width, wrap_y: wrap.y, wrap_x: wrap.x };
     let sigma = f64::from(params.sigma) * height.min(width) as f64;
+    let stationarity = stationarity::histogram_cost(&pixels, domain, sigma);
+    let by_measure = |evenness: stationary::Evenness| match evenness.statistic {
+        Statistic::Histogram if sigma_map.is_none() => stationarity,
+        other => other.cost(&pixels, domain, &evenness.window((height, width), domain)),
+    };
     Costs {
         texture: map.map(|map| texture::cost_bound(picture, photo, map, params.patch, wrap)),
-        stationarity: stationarity::histogram_cost(&pixels, domain, sigma),
+        stationarity,
+        stationarity_by_measure: params.evenness(sigma_map).map(by_measure),
     }
 }

@@ -4,11 +4,12 @@ use texforge::analyze::stationarity::histogram_cost;
 use texforge::image::color::ColorModel;
 use texforge::method::stationary::{self, Look};
 use texforge::search::patchmatch::Wrap;
-use texforge::signal::localhist::Domain;
+use texforge::signal::measure::Statistic;
+use texforge::signal::window::Domain;
 use texforge::{
-    Axis, Ctx, Encoding, Error, MapKind, Mask, Method, Picture, Quality, Result, Samples, Simd,
-    Size, SourceMap, TextureCost, TextureCostParams, Tile, TileParams, texture_cost, tile,
-    tile_traced,
+    Axis, Ctx, Encoding, Error, Guides, MapKind, Mask, Method, Picture, Quality, Result, Samples,
+    Simd, Size, SourceMap, TextureCost, TextureCostParams, Tile, TileParams, texture_cost, tile,
+    tile_guided,
 };
 
 use crate::support::exemplar::{grain, hash, pebbles, stained};
@@ -249,7 +250,8 @@ mod trace {
     const METHODS: [Method; 3] = [Method::Stationary, Method::WrapOnly, Method::NoWrap];
 
     fn traced(photo: &Picture, params: &TileParams) -> Tile {
-        tile_traced(&ctx(2), photo, None, params).expect("a tile")
+        tile_guided(&ctx(2), photo, Guides { trace: true, ..Guides::default() }, params)
+            .expect("a tile")
     }
 
     #[test]
@@ -303,9 +305,14 @@ mod trace {
         let plan = stationary::Plan {
             size: (52, 56),
             wrap: Wrap { y: true, x: true },
-            sigma: Some(0.2),
+            evenness: Some(stationary::Evenness {
+                statistic: Statistic::Histogram,
+                sigma: 0.2,
+                sigma_map: None,
+            }),
             patch: 5,
             uniformity: params.uniformity,
+            rarity: params.rarity,
             coarse_iterations: 12,
             fine_iterations: 1,
         };
@@ -355,9 +362,10 @@ mod trace {
         let plan = stationary::Plan {
             size: (40, 40),
             wrap: Wrap { y: true, x: true },
-            sigma: None,
+            evenness: None,
             patch: 5,
             uniformity: 1.0,
+            rarity: 0.0,
             coarse_iterations: 5,
             fine_iterations: 1,
         };

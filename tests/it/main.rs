@@ -5,6 +5,7 @@ mod costs;
 mod golden;
 mod house;
 mod io;
+mod measures;
 mod quality;
 mod search;
 #[path = "../support/mod.rs"]

@@ -10,10 +10,13 @@ use rayon::prelude::*;
 
 use crate::search::field::Pos;
 use crate::search::patch::{CODE_MAX, MatchImage};
+use crate::search::place_cost::PlaceCost;
+use crate::search::rarity::rarity;
 use crate::search::source::Source;
 use crate::signal::histogram::{Distribution, Quantiles, SOFT_BITS, Soft};
-use crate::signal::localhist::{Domain, LocalDistributions};
+use crate::signal::localhist::LocalDistributions;
 use crate::signal::resample::{resized, resized_mask};
+use crate::signal::window::Domain;
 
 /// Ratio of the sides of two neighbouring levels (the paper's).
 const RATIO: f64 = 1.3;
@@ -31,6 +34,10 @@ const TYPICAL_WINDOW: f64 = 0.15;
 /// Cost of using a patch as often as the average, as a share of the patch's own variance. More
 /// drives neighbouring pixels to different places of the photo, and the vote blurs.
 const USAGE_SHARE: f64 = 0.024;
+
+/// Shorter side of the largest level at which rare places are looked for. A patch then spans a
+/// twentieth of the photo; what is smaller than a tenth of a patch here, nobody notices in a tile.
+const RARITY_SIDE: usize = 256;
 
 /// Affine map from L*a*b* to 7-bit codes, the same scale for all channels, so that distances of
 /// codes are Euclidean distances of colours.
@@ -99,6 +106,8 @@ pub(super) struct Level {
     pub(super) quantiles: [Quantiles; 4],
     /// Uniformity cost of using a patch as often as the average, in squared codes.
     pub(super) usage_unit: f32,
+    /// What rare places cost.
+    pub(super) rarity: PlaceCost,
     /// The exemplar as a picture, if somebody watches.
     pub(super) exemplar: Option<Picture>,
 }
@@ -160,7 +169,7 @@ pub(super) fn build(
         }
     }
     // Only the coarsest level matches colours; without projection it is the paper's plain target.
-    if let (Some(coarsest), true) = (levels.last_mut(), plan.sigma.is_some()) {
+    if let (Some(coarsest), true) = (levels.last_mut(), plan.evenness.is_some()) {
         for (quantiles, typical) in
             coarsest.quantiles.iter_mut().zip(typical_quantiles(&coarsest.source))
         {
@@ -169,7 +178,23 @@ pub(super) fn build(
             }
         }
     }
+    if plan.rarity > 0.0 {
+        rate(ctx, &mut levels);
+    }
     Ok(levels)
+}
+
+/// Finds what is rare at the coarse levels; the finer ones take it over.
+fn rate(ctx: &Ctx, levels: &mut [Level]) {
+    let mut coarser: Option<PlaceCost> = None;
+    for level in levels.iter_mut().rev() {
+        let side = level.source.rows().min(level.source.cols());
+        level.rarity = match coarser {
+            Some(coarser) if side > RARITY_SIDE => coarser.resized(&level.source),
+            _ => rarity(ctx, &level.source),
+        };
+        coarser = Some(level.rarity.clone());
+    }
 }
 
 fn level(
@@ -236,7 +261,8 @@ fn level(
         })
         .sum();
     let usage_unit = (USAGE_SHARE * variance * (patch * patch) as f64) as f32;
-    Some(Level { size, source, quantiles, usage_unit, exemplar: None })
+    let rarity = PlaceCost::free(&source);
+    Some(Level { size, source, quantiles, usage_unit, rarity, exemplar: None })
 }
 
 /// Averaging pixels as a picture that has the same colours to match.
@@ -265,7 +291,8 @@ fn typical_quantiles(source: &Source) -> [Option<Quantiles>; CONTRAST] {
     let domain = Domain { height, width, wrap_y: false, wrap_x: false };
     let sigma = TYPICAL_WINDOW * height.min(width) as f64;
     std::array::from_fn(|k| {
-        LocalDistributions::new(&soft, Some(&usable), k, domain, sigma).typical()
+        let code = |i: usize| usable[i].then_some(soft[i][k]);
+        LocalDistributions::new(code, domain, sigma).typical()
     })
 }
 
