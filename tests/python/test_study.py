@@ -148,6 +148,8 @@ def test_the_summary_is_what_the_rows_come_to(done: texforge.Study) -> None:
         assert f"{column}_over_baseline" not in base
     mine, theirs = variances("stationary"), variances("wrap-only")
     assert ours["c_stat_variance"]["value"] == pytest.approx(np.mean(mine))
+    relative = [v**0.5 / m for v, m in zip(mine, means("stationary", "c_stat"), strict=True)]
+    assert ours["c_stat_relative_deviation"]["value"] == pytest.approx(np.mean(relative))
     ratios = [b / a for a, b in zip(mine, theirs, strict=True)]
     assert ours["baseline_variance_over_c_stat_variance"]["value"] == pytest.approx(np.mean(ratios))
     both = ours["mean_baseline_variance_over_mean_c_stat_variance"]["value"]

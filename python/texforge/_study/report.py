@@ -124,6 +124,8 @@ def summary(data: Data, settings: Settings, skipped: dict[str, str]) -> dict[str
         if data.n_seeds > 1:
             variances = data.values("c_stat").var(axis=2, ddof=1)
             way["c_stat_variance"] = _told(variances[i])
+            deviations = _over(np.sqrt(variances), data.values("c_stat").mean(axis=2))
+            way["c_stat_relative_deviation"] = _told(deviations[i])
             if i > 0:
                 way["baseline_variance_over_c_stat_variance"] = _told(
                     _over(variances[0], variances[i])
@@ -172,18 +174,19 @@ def _lines(data: Data, told: dict[str, Any]) -> list[str]:
         "",
         "Medians over the exemplars of the mean over the seeds, with the 95 % confidence interval "
         "(bootstrap over the exemplars). `x baseline`: the median of the ratio to the baseline, "
-        f"`{told['baseline']}`. Variance: of c_stat over the seeds; the last two columns say how "
-        "many times larger the baseline's is, as the median of the ratios and as the ratio of the "
-        "means.",
+        f"`{told['baseline']}`. Variance: of c_stat over the seeds; deviation: its root over the "
+        "mean. The two columns behind say how many times larger the baseline's variance is, as the "
+        "median of the ratios and as the ratio of the means.",
         "",
         "| | c_text | c_stat | total | c_text x baseline | c_stat x baseline | total x baseline "
-        "| variance | median ratio | ratio of means | seconds |",
-        "| --- |" + " ---: |" * 10,
+        "| variance | deviation | median ratio | ratio of means | seconds |",
+        "| --- |" + " ---: |" * 11,
     ]
     columns = [
         *COSTS,
         *(f"{cost}_over_baseline" for cost in COSTS),
         "c_stat_variance",
+        "c_stat_relative_deviation",
         "baseline_variance_over_c_stat_variance",
         "mean_baseline_variance_over_mean_c_stat_variance",
     ]
