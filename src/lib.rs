@@ -31,4 +31,7 @@ pub use image::mask::Mask;
 pub use image::material::MapKind;
 pub use image::picture::{Encoding, Picture, Samples};
 pub use image::sourcemap::SourceMap;
-pub use verb::tile::{Axis, Costs, Measure, Method, Quality, Report, Size, Tile, TileParams, tile};
+pub use verb::inputs::Inputs;
+pub use verb::tile::{
+    Axis, Costs, Measure, Method, Quality, Report, Size, Tile, TileParams, tile, tile_from,
+};

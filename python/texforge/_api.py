@@ -45,8 +45,10 @@ def tile(
     patch: int = 11,
     uniformity: float = 1.0,
     quality: Quality = "normal",
+    avoid_grow: int = 0,
     seed: int = 0,
     mask: ImageLike | None = None,
+    avoid: ImageLike | None = None,
     maps: Mapping[str, ImageLike] | None = None,
     encoding: Encoding | Literal["auto"] = "auto",
     threads: int | None = None,
@@ -82,10 +84,16 @@ def tile(
         How strongly every part of the photo is made to contribute equally, 0 (not at all) to 100.
     quality : {"draft", "normal", "best"}
         How much time to spend.
+    avoid_grow : int
+        How far the marks of `avoid` are grown, in pixels, 0 to 10000: nothing this near to a mark
+        (as the crow flies) is copied.
     seed : int
         Seed of all random choices, 0 to 2**64 - 1.
     mask : (H, W) array_like, or Pillow image, optional
         Where the photo may be used: True, or at least half of full scale (128 of 255).
+    avoid : (H, W) array_like, or Pillow image, optional
+        What must not be copied from the photo, such as stains: marks that are True, or at least
+        half of full scale. May be given together with `mask`.
     maps : mapping of str to array_like, optional
         Other maps of the same material by name, to be tiled the same way. The name decides what
         a map is: base colour and emission are colours, normals are vectors (and come out with
@@ -153,6 +161,7 @@ def tile(
         "patch": str(_arrays.integer("patch", patch)),
         "uniformity": _number("uniformity", uniformity),
         "quality": _word("quality", quality),
+        "avoid_grow": str(_arrays.integer("avoid_grow", avoid_grow)),
     }
     if maps and method == "make-seamless":
         raise ParameterError(
@@ -166,6 +175,7 @@ def tile(
         picture_out, map_out, maps_out, report_text = _texforge.tile(
             photo=photo.packed(),
             mask=None if mask is None else _arrays.mask(mask).packed(),
+            avoid=None if avoid is None else _arrays.mask(avoid, "the avoid mask").packed(),
             maps=[(name, other.packed(), kinds[name]) for name, other in others.items()],
             params=list(params.items()),
             seed=_arrays.integer("seed", seed),

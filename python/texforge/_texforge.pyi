@@ -30,6 +30,7 @@ def tile(
     *,
     photo: _Picture,
     mask: _Picture | None,
+    avoid: _Picture | None,
     maps: list[tuple[str, _Picture, str]],
     params: list[tuple[str, str]],
     seed: int,

@@ -16,6 +16,7 @@ Examples:
   texforge tile brick.jpg -o brick.png --size 1024x1024 --preview
   texforge tile brick.jpg -o trim.png --axis x --quality best
   texforge tile scan.png -o wall.png --mask usable.png --map normal=scan_nrm.png
+  texforge tile brick.jpg -o clean.png --avoid stains.png --avoid-grow 12
   texforge tile brick.jpg -o - | display";
 
 const APPLY_EXAMPLES: &str = "\
@@ -100,6 +101,11 @@ fn tile() -> Command {
             file("mask", "FILE", "Picture of the photo's size: usable is where its first channel is at least half of \
                  full scale and its alpha, if any, too; the photo's own transparent pixels are never used")
                 .long("mask"),
+        )
+        .arg(
+            file("avoid", "FILE", "Picture of the photo's size whose marks are never copied: where its first channel is \
+                 at least half of full scale and its alpha, if any, too; --avoid-grow widens the marks")
+                .long("avoid"),
         )
         .arg(
             Arg::new("map")

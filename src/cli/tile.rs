@@ -19,7 +19,8 @@ use crate::cli::{args, files, preview};
 use crate::image::mask::Mask;
 use crate::image::material::{MapKind, Sibling};
 use crate::image::picture::Picture;
-use crate::verb::tile::{Costs, Method, Report, Size, Tile, TileParams, tile};
+use crate::verb::inputs::Inputs;
+use crate::verb::tile::{Costs, Method, Report, Size, Tile, TileParams, tile_from};
 
 /// What was typed, checked as far as it can be without looking at a file.
 #[derive(Debug)]
@@ -28,6 +29,7 @@ struct Request {
     target: Target,
     params: TileParams,
     mask: Option<PathBuf>,
+    avoid: Option<PathBuf>,
     maps: Vec<Wanted>,
     pick_up: bool,
     source_map: Option<PathBuf>,
@@ -127,6 +129,7 @@ impl Request {
             target,
             params,
             mask: path("mask"),
+            avoid: path("avoid"),
             maps,
             source_map,
             preview,
@@ -136,7 +139,8 @@ impl Request {
 
     fn inputs(&self) -> Vec<&Path> {
         let maps = self.maps.iter().map(|m| m.path.as_path());
-        maps.chain([self.photo.as_path()]).chain(self.mask.as_deref()).collect()
+        let masks = self.mask.as_deref().into_iter().chain(self.avoid.as_deref());
+        maps.chain([self.photo.as_path()]).chain(masks).collect()
     }
 
     /// Fails if an output cannot be written, or two outputs are the same file.
@@ -181,21 +185,22 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Str
     let photo = files::read(&request.photo, MapKind::Color)?;
     session.check()?;
     let mut notes: Vec<String> = photo.meta.notes.clone();
-    let mask = match &request.mask {
-        None => None,
-        Some(path) => {
-            let mask = Mask::from_picture(&files::read(path, MapKind::Color)?)?;
-            mask.ensure_size(photo.height(), photo.width())?;
-            Some(mask)
-        }
+    let read_mask = |path: &Option<PathBuf>, what| {
+        let Some(path) = path else { return Ok(None) };
+        let mask = Mask::from_picture(&files::read(path, MapKind::Color)?)?;
+        mask.ensure_size(what, photo.height(), photo.width())?;
+        Ok(Some(mask))
     };
+    let mask = read_mask(&request.mask, "the mask")?;
+    let avoid = read_mask(&request.avoid, "the avoid mask")?;
     let maps = read_maps(session, request, &photo, &mut notes)?;
     request.check_outputs(&maps)?;
     files::ensure_can_hold(&photo, request.target.file(), MapKind::Color)?;
     session.check()?;
 
     // The long work.
-    let Tile { picture, source_map, report } = tile(ctx, &photo, mask.as_ref(), &request.params)?;
+    let inputs = Inputs { photo: &photo, mask: mask.as_ref(), avoid: avoid.as_ref() };
+    let Tile { picture, source_map, report } = tile_from(ctx, &inputs, &request.params)?;
     notes.extend(report.notes.iter().cloned());
 
     // Encode and stage every file; the maps follow the tile.

@@ -22,7 +22,8 @@ use crate::image::mask::Mask;
 use crate::image::material::{self, MapKind};
 use crate::image::picture::Picture;
 use crate::image::sourcemap::SourceMap;
-use crate::verb::tile::TileParams;
+use crate::verb::inputs::Inputs;
+use crate::verb::tile::{TileParams, tile_from};
 use array::{ArrayIn, ArrayOut, MapIn, MapOut, array_out, map_out};
 use error::IntoPy;
 
@@ -57,11 +58,12 @@ fn ensure_same_shape(name: &str, map: &Picture, photo: &Picture) -> Result<()> {
     reason = "one private caller, in _api.py, passes them by name"
 )]
 #[expect(clippy::type_complexity, reason = "one private caller, in _api.py, names its parts")]
-#[pyo3(signature = (*, photo, mask, maps, params, seed, threads, progress))]
+#[pyo3(signature = (*, photo, mask, avoid, maps, params, seed, threads, progress))]
 fn tile<'py>(
     py: Python<'py>,
     photo: ArrayIn<'py>,
     mask: Option<ArrayIn<'py>>,
+    avoid: Option<ArrayIn<'py>>,
     maps: Vec<NamedMap<'py>>,
     params: Vec<(String, String)>,
     seed: u64,
@@ -74,10 +76,11 @@ fn tile<'py>(
     }
     settings.validate().into_py(py)?;
     let photo = photo.picture(py)?;
-    let mask = match mask {
-        Some(mask) => Some(Mask::from_picture(&mask.picture(py)?).into_py(py)?),
-        None => None,
+    let read_mask = |mask: Option<ArrayIn<'py>>| {
+        let mask = mask.map(|mask| mask.picture(py)).transpose()?;
+        mask.map(|mask| Mask::from_picture(&mask)).transpose().into_py(py)
     };
+    let (mask, avoid) = (read_mask(mask)?, read_mask(avoid)?);
     let mut others = Vec::with_capacity(maps.len());
     for (name, map, kind) in &maps {
         let map = map.picture(py)?;
@@ -87,7 +90,8 @@ fn tile<'py>(
     let ctx = Ctx::new(seed, threads).into_py(py)?;
     let job = ctx.job();
     let (tile, gathered) = enter::enter(py, &job, progress.as_ref(), move || {
-        let tile = crate::verb::tile::tile(&ctx, &photo, mask.as_ref(), &settings)?;
+        let inputs = Inputs { photo: &photo, mask: mask.as_ref(), avoid: avoid.as_ref() };
+        let tile = tile_from(&ctx, &inputs, &settings)?;
         let mut gathered = Vec::with_capacity(others.len());
         if let Some(source_map) = &tile.source_map {
             for (name, map, kind) in others {

@@ -1,3 +1,4 @@
 //! Room 7: the public functions, one file each. They pick methods, combine them and report.
 
+pub mod inputs;
 pub mod tile;

@@ -17,6 +17,7 @@ use crate::image::sourcemap::SourceMap;
 use crate::method::{make_seamless, stationary};
 use crate::search::patchmatch::Wrap;
 use crate::signal::localhist::Domain;
+use crate::verb::inputs::Inputs;
 
 /// Longest side of a tile, in pixels.
 const MAX_TILE_SIDE: usize = 32_768;
@@ -127,6 +128,8 @@ params! {
         uniformity: f32 = 1.0, in 0.0..=100.0;
         /// How much time to spend.
         quality: Quality = Quality::Normal;
+        /// How far the marks of the avoid mask are grown: nothing this near to a mark is copied.
+        avoid_grow: usize = 0, in 0..=10000, unit "px";
     }
 }
 
@@ -210,14 +213,23 @@ impl TileParams {
 ///
 /// # Errors
 /// [`Error::Parameter`], [`Error::TooSmall`] (patch larger than photo or tile),
-/// [`Error::EmptyMask`], [`Error::SizeMismatch`] (mask), [`Error::NotFinite`], [`Error::Memory`]
+/// [`Error::EmptyMask`], [`Error::SizeMismatch`] (masks), [`Error::NotFinite`], [`Error::Memory`]
 /// (checked before anything is allocated), [`Error::Cancelled`].
 pub fn tile(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, params: &TileParams) -> Result<Tile> {
+    tile_from(ctx, &Inputs { mask, ..Inputs::new(photo) }, params)
+}
+
+/// As [`tile`], with everything that a tile can be made from.
+///
+/// # Errors
+/// As [`tile`].
+pub fn tile_from(ctx: &Ctx, inputs: &Inputs<'_>, params: &TileParams) -> Result<Tile> {
+    let photo = inputs.photo;
     let start = Instant::now();
     let (width, height) = check(photo, params)?;
     let size = (height, width);
     let wrap = Wrap { y: params.axis != Axis::X, x: params.axis != Axis::Y };
-    let mask = usable_mask(photo, mask)?;
+    let mask = inputs.usable(params)?;
     let mut notes = Vec::new();
     if mask.is_some() && params.method == Method::MakeSeamless {
         notes.push("the method make-seamless uses the whole photo; the mask is ignored".to_owned());
@@ -291,19 +303,6 @@ fn check(photo: &Picture, params: &TileParams) -> Result<(usize, usize)> {
         .checked_add((width * height) as u64 * (photo.byte_len() / (pw * ph)) as u64);
     ensure_available(&format!("a {width}x{height} tile from a {pw}x{ph} photo"), need)?;
     Ok((width, height))
-}
-
-/// Where the photo may be used: the caller's mask and the photo's own alpha; `None` is everywhere.
-fn usable_mask(photo: &Picture, mask: Option<&Mask>) -> Result<Option<Mask>> {
-    if let Some(mask) = mask {
-        mask.ensure_size(photo.height(), photo.width())?;
-    }
-    let both = match (mask, Mask::from_alpha(photo)) {
-        (Some(mask), Some(alpha)) => Some(mask.and(&alpha)?),
-        (Some(mask), None) => Some(mask.clone()),
-        (None, alpha) => alpha,
-    };
-    Ok(both.filter(|m| m.count() < m.usable().len()))
 }
 
 fn plan(params: &TileParams, size: (usize, usize), wrap: Wrap) -> stationary::Plan {

@@ -83,6 +83,21 @@ def test_no_masked_pixel_is_used(seed: int, share: float) -> None:
     assert usable[tuple(np.moveaxis(source_map_of(tile), -1, 0))].all()
 
 
+def test_nothing_near_an_avoided_pixel_is_used(photo: Photo) -> None:
+    marks = np.zeros((48, 64), bool)
+    marks[10:14, 20:30] = True
+    rows, columns = np.mgrid[:48, :64]
+    marked = np.argwhere(marks)
+    far = np.hypot(rows[..., None] - marked[:, 0], columns[..., None] - marked[:, 1]).min(axis=2)
+    plain = texforge.tile(photo, **QUICK)
+    assert (far[tuple(np.moveaxis(source_map_of(plain), -1, 0))] <= 4).any()
+    for usable in (None, np.arange(48)[:, np.newaxis].repeat(64, axis=1) < 40):
+        tile = texforge.tile(photo, avoid=marks, avoid_grow=4, mask=usable, **QUICK)
+        y, x = np.moveaxis(source_map_of(tile), -1, 0)
+        assert (far[y, x] > 4).all()
+        assert usable is None or usable[y, x].all()
+
+
 @pytest.mark.parametrize("dtype", ["bool", "uint8", "uint16", "float32"])
 def test_masks_of_every_type_mean_the_same(photo: Photo, dtype: str) -> None:
     usable = np.zeros((48, 64), bool)
