@@ -33,5 +33,5 @@ pub use image::picture::{Encoding, Picture, Samples};
 pub use image::sourcemap::SourceMap;
 pub use verb::inputs::Inputs;
 pub use verb::tile::{
-    Axis, Costs, Measure, Method, Quality, Report, Size, Tile, TileParams, tile, tile_from,
+    Axis, Costs, Measure, Method, Quality, Report, Size, Tile, TileParams, tile, tiles,
 };

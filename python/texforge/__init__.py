@@ -6,7 +6,14 @@ can follow (`apply`). `read_image` and `write_image` keep all the bits that file
 Everything raised on purpose is a `TexforgeError`.
 """
 
-from texforge._api import apply, load_source_map, read_image, tile, write_image
+from texforge._api import (
+    apply,
+    load_source_map,
+    read_image,
+    tile,
+    tile_variants,
+    write_image,
+)
 from texforge._errors import (
     AccessError,
     Cancelled,
@@ -38,6 +45,7 @@ from texforge._types import (
     Quality,
     SourceMap,
     Tile,
+    TileOptions,
 )
 
 __all__ = [
@@ -68,10 +76,12 @@ __all__ = [
     "SourceMap",
     "TexforgeError",
     "Tile",
+    "TileOptions",
     "__version__",
     "apply",
     "load_source_map",
     "read_image",
     "tile",
+    "tile_variants",
     "write_image",
 ]

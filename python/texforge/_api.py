@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 from collections.abc import Mapping  # noqa: TC003 (the signatures can be resolved at run time)
-from typing import Any, Literal
+from typing import Any, Literal, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -26,9 +27,10 @@ from texforge._types import (
     Quality,
     SourceMap,
     Tile,
+    TileOptions,
 )
 
-__all__ = ["apply", "load_source_map", "read_image", "tile", "write_image"]
+__all__ = ["apply", "load_source_map", "read_image", "tile", "tile_variants", "write_image"]
 
 # Longest side of a notebook's picture: larger ones only slow the page down.
 _PREVIEW_SIDE = 1024
@@ -46,6 +48,7 @@ def tile(
     uniformity: float = 1.0,
     quality: Quality = "normal",
     avoid_grow: int = 0,
+    flatten: float = 0.0,
     seed: int = 0,
     mask: ImageLike | None = None,
     avoid: ImageLike | None = None,
@@ -57,7 +60,7 @@ def tile(
     """Turn a photo into a texture that repeats without a seam and without a giveaway blob.
 
     Every pixel of the tile is a copy of a pixel of the photo (except with the method
-    ``"make-seamless"``), bit for bit.
+    ``"make-seamless"``; see `flatten` for what it does to the photo first), bit for bit.
 
     Parameters
     ----------
@@ -87,6 +90,11 @@ def tile(
     avoid_grow : int
         How far the marks of `avoid` are grown, in pixels, 0 to 10000: nothing this near to a mark
         (as the crow flies) is copied.
+    flatten : float
+        Reach of the light flattening, as a fraction of the photo's shorter side, 0 (off) or 0.02
+        to 1: differences of light and of its colour that are wider are divided out of the photo
+        before it is used. The tile then is made of the flattened photo's pixels; `maps` are left
+        as they are.
     seed : int
         Seed of all random choices, 0 to 2**64 - 1.
     mask : (H, W) array_like, or Pillow image, optional
@@ -151,19 +159,69 @@ def tile(
     >>> bool(np.all(tile.image == photo[y, x]))
     True
     """
+    arguments = locals()
+    (made,) = _tiles(1, **arguments)
+    return made
+
+
+def tile_variants(image: ImageLike, count: int, **options: Unpack[TileOptions]) -> list[Tile]:
+    """Make several tiles of one photo, which is analysed once.
+
+    Parameters
+    ----------
+    image : (H, W) or (H, W, C) array_like, or Pillow image
+        The photo.
+    count : int
+        How many, 1 to 1000. The first is what `tile` makes of the same arguments; the others have
+        the seeds after its `seed`.
+    **options
+        Those of `tile`.
+
+    Returns
+    -------
+    list of Tile
+        All of them; choose.
+
+    Raises
+    ------
+    ParameterError
+        If `count` is out of range, more than 1 with the method ``"make-seamless"``, which makes
+        no random choices, or leads beyond the last seed; and as `tile`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import texforge
+    >>> photo = np.random.default_rng(0).integers(0, 256, (64, 64, 3), dtype=np.uint8)
+    >>> tiles = texforge.tile_variants(photo, 3, size=32, seed=5, quality="draft")
+    >>> best = min(tiles, key=lambda tile: tile.costs.stationarity)
+    >>> best.seed in (5, 6, 7)
+    True
+    """
+    arguments = inspect.signature(tile).bind(image, **options)
+    arguments.apply_defaults()
+    return _tiles(_arrays.integer("count", count, 1, 1000), **arguments.arguments)
+
+
+def _tiles(
+    count: int,
+    *,
+    image: ImageLike,
+    seed: int,
+    mask: ImageLike | None,
+    avoid: ImageLike | None,
+    maps: Mapping[str, ImageLike] | None,
+    encoding: Encoding | Literal["auto"],
+    threads: int | None,
+    progress: Progress,
+    **params: Any,
+) -> list[Tile]:
     photo = _arrays.picture(image, "the photo", encoding)
-    params = {
-        "size": _size_text(size),
-        "axis": _word("axis", axis),
-        "method": _word("method", method),
-        "measure": _word("measure", measure),
-        "sigma": _number("sigma", sigma),
-        "patch": str(_arrays.integer("patch", patch)),
-        "uniformity": _number("uniformity", uniformity),
-        "quality": _word("quality", quality),
-        "avoid_grow": str(_arrays.integer("avoid_grow", avoid_grow)),
-    }
-    if maps and method == "make-seamless":
+    texts = [
+        (param["name"], _text(param["name"], param["kind"], params[param["name"]]))
+        for param in _texforge.schema()
+    ]
+    if maps and params["method"] == "make-seamless":
         raise ParameterError(
             "`maps` must be empty with method 'make-seamless', which blends and so leaves nothing "
             f"to apply to other maps, got {', '.join(map(repr, maps))}",
@@ -172,16 +230,22 @@ def tile(
     others = {name: _map(other, name) for name, other in (maps or {}).items()}
     kinds = {name: _texforge.map_kind(name) for name in others}
     with reporting(progress) as callback:
-        picture_out, map_out, maps_out, report_text = _texforge.tile(
+        made = _texforge.tiles(
             photo=photo.packed(),
             mask=None if mask is None else _arrays.mask(mask).packed(),
             avoid=None if avoid is None else _arrays.mask(avoid, "the avoid mask").packed(),
             maps=[(name, other.packed(), kinds[name]) for name, other in others.items()],
-            params=list(params.items()),
+            params=texts,
             seed=_arrays.integer("seed", seed),
+            count=count,
             threads=_arrays.integer("threads", threads or 0, high=1024),
             progress=callback,
         )
+    return [_tile(photo, others, parts) for parts in made]
+
+
+def _tile(photo: _arrays.Picture, others: dict[str, _arrays.Picture], parts: Any) -> Tile:
+    picture_out, map_out, maps_out, report_text = parts
     report = json.loads(report_text)
     report["notes"] = [*report["notes"], *photo.notes]
     return Tile(
@@ -459,6 +523,15 @@ def _size_text(size: object) -> str:
         )
     height, width = (_arrays.integer("size", side, 1) for side in sides)
     return f"{width}x{height}"
+
+
+def _text(name: str, kind: str, value: Any) -> str:
+    """Return a parameter as the text that the core reads."""
+    if kind == "size":
+        return _size_text(value)
+    if kind == "integer":
+        return str(_arrays.integer(name, value))
+    return _number(name, value) if kind == "number" else _word(name, value)
 
 
 def _word(name: str, value: object) -> str:

@@ -7,6 +7,7 @@ _Picture = tuple[Any, str, tuple[int, int, int], str]
 _PictureOut = tuple[bytearray, str, tuple[int, int, int], str]
 _Map = tuple[Any, tuple[int, int], tuple[int, int]]
 _MapOut = tuple[bytearray, tuple[int, int], tuple[int, int]]
+_TileOut = tuple[_PictureOut, _MapOut | None, list[tuple[str, _PictureOut]], str]
 
 __all__ = [
     "__version__",
@@ -19,14 +20,14 @@ __all__ = [
     "read",
     "read_source_map",
     "schema",
-    "tile",
+    "tiles",
     "write",
     "write_source_map",
 ]
 
 __version__: str
 
-def tile(
+def tiles(
     *,
     photo: _Picture,
     mask: _Picture | None,
@@ -34,9 +35,10 @@ def tile(
     maps: list[tuple[str, _Picture, str]],
     params: list[tuple[str, str]],
     seed: int,
+    count: int,
     threads: int,
     progress: Callable[[float], object] | None,
-) -> tuple[_PictureOut, _MapOut | None, list[tuple[str, _PictureOut]], str]: ...
+) -> list[_TileOut]: ...
 def apply(*, source_map: _Map, picture: _Picture, kind: str) -> _PictureOut: ...
 def read(*, path: str, kind: str) -> _PictureOut: ...
 def write(

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from os import PathLike
-from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias, TypedDict
 
 import numpy as np
 import numpy.typing as npt
@@ -28,6 +28,7 @@ __all__ = [
     "Quality",
     "SourceMap",
     "Tile",
+    "TileOptions",
 ]
 
 # Unions, not Literal["a", "b"]: mypy holds both for the same, stubtest only the union.
@@ -65,6 +66,28 @@ ImageLike: TypeAlias = npt.ArrayLike | _PillowImage
 """Anything that `numpy.asarray` makes a picture of, or a Pillow image."""
 Progress: TypeAlias = bool | Callable[[float], object] | ProgressBar | None
 """What `progress=` may be: see `texforge.tile`."""
+
+
+class TileOptions(TypedDict, total=False):
+    """The options of `texforge.tile`, for `texforge.tile_variants`."""
+
+    size: int | tuple[int, int] | None
+    axis: Axis
+    method: Method
+    measure: Measure
+    sigma: float
+    patch: int
+    uniformity: float
+    quality: Quality
+    avoid_grow: int
+    flatten: float
+    seed: int
+    mask: ImageLike | None
+    avoid: ImageLike | None
+    maps: Mapping[str, ImageLike] | None
+    encoding: Encoding | Literal["auto"]
+    threads: int | None
+    progress: Progress
 
 
 class Image(np.ndarray[Any, np.dtype[Any]]):

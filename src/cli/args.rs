@@ -2,13 +2,13 @@
 
 use std::path::PathBuf;
 
-use clap::builder::{PossibleValuesParser, StringValueParser, ValueParser};
+use clap::builder::{PossibleValuesParser, RangedU64ValueParser, StringValueParser, ValueParser};
 use clap::{Arg, ArgAction, ArgMatches, Command, ValueHint, value_parser};
 
 use crate::base::error::Result;
 use crate::base::params::Param;
 use crate::cli::maps;
-use crate::verb::tile::TileParams;
+use crate::verb::tile::{MAX_VARIANTS, TileParams};
 
 const TILE_EXAMPLES: &str = "\
 Examples:
@@ -17,6 +17,7 @@ Examples:
   texforge tile brick.jpg -o trim.png --axis x --quality best
   texforge tile scan.png -o wall.png --mask usable.png --map normal=scan_nrm.png
   texforge tile brick.jpg -o clean.png --avoid stains.png --avoid-grow 12
+  texforge tile meadow.jpg -o meadow.png --flatten 0.2 --variants 4
   texforge tile brick.jpg -o - | display";
 
 const APPLY_EXAMPLES: &str = "\
@@ -122,6 +123,18 @@ fn tile() -> Command {
         )
         .arg(switch("no-maps", "Leave alone the maps that lie beside the photo"))
         .next_help_heading("Outputs")
+        .arg(
+            Arg::new("variants")
+                .long("variants")
+                .value_name("N")
+                .default_value("1")
+                .value_parser(RangedU64ValueParser::<usize>::new().range(1..=MAX_VARIANTS as u64))
+                .allow_negative_numbers(true)
+                .help(
+                    "Make N tiles, 1 to 1000, whose seeds are --seed and those after it; with two and more \
+                     every output's name is numbered: tile-1.png, tile-2.png, ...",
+                ),
+        )
         .arg(
             file("save-source-map", "FILE.exr", "Also write which photo pixel each tile pixel is, for `texforge apply`")
                 .long("save-source-map"),

@@ -12,6 +12,7 @@ mod output;
 mod preview;
 mod show;
 mod small;
+mod summary;
 mod tile;
 mod work;
 

@@ -6,3 +6,4 @@ pub mod mask;
 pub mod material;
 pub mod picture;
 pub mod sourcemap;
+pub mod symmetry;

@@ -23,7 +23,7 @@ use crate::image::material::{self, MapKind};
 use crate::image::picture::Picture;
 use crate::image::sourcemap::SourceMap;
 use crate::verb::inputs::Inputs;
-use crate::verb::tile::{TileParams, tile_from};
+use crate::verb::tile::{Tile, TileParams};
 use array::{ArrayIn, ArrayOut, MapIn, MapOut, array_out, map_out};
 use error::IntoPy;
 
@@ -51,15 +51,17 @@ fn ensure_same_shape(name: &str, map: &Picture, photo: &Picture) -> Result<()> {
     }
 }
 
-/// Makes a tile. Returns the picture, the source map, the gathered maps and the report as JSON.
+/// A tile for Python: the picture, the source map, the gathered maps and the report as JSON.
+type TileOut<'py> = (ArrayOut<'py>, Option<MapOut<'py>>, Vec<(String, ArrayOut<'py>)>, String);
+
+/// Makes `count` tiles.
 #[pyfunction]
 #[expect(
     clippy::too_many_arguments,
     reason = "one private caller, in _api.py, passes them by name"
 )]
-#[expect(clippy::type_complexity, reason = "one private caller, in _api.py, names its parts")]
-#[pyo3(signature = (*, photo, mask, avoid, maps, params, seed, threads, progress))]
-fn tile<'py>(
+#[pyo3(signature = (*, photo, mask, avoid, maps, params, seed, count, threads, progress))]
+fn tiles<'py>(
     py: Python<'py>,
     photo: ArrayIn<'py>,
     mask: Option<ArrayIn<'py>>,
@@ -67,9 +69,10 @@ fn tile<'py>(
     maps: Vec<NamedMap<'py>>,
     params: Vec<(String, String)>,
     seed: u64,
+    count: usize,
     threads: usize,
     progress: Option<Bound<'py, PyAny>>,
-) -> PyResult<(ArrayOut<'py>, Option<MapOut<'py>>, Vec<(String, ArrayOut<'py>)>, String)> {
+) -> PyResult<Vec<TileOut<'py>>> {
     let mut settings = TileParams::default();
     for (name, text) in &params {
         settings.set(name, text).into_py(py)?;
@@ -89,26 +92,33 @@ fn tile<'py>(
     }
     let ctx = Ctx::new(seed, threads).into_py(py)?;
     let job = ctx.job();
-    let (tile, gathered) = enter::enter(py, &job, progress.as_ref(), move || {
+    let made = enter::enter(py, &job, progress.as_ref(), move || {
         let inputs = Inputs { photo: &photo, mask: mask.as_ref(), avoid: avoid.as_ref() };
-        let tile = tile_from(&ctx, &inputs, &settings)?;
-        let mut gathered = Vec::with_capacity(others.len());
-        if let Some(source_map) = &tile.source_map {
-            for (name, map, kind) in others {
-                gathered.push((name, source_map.apply(&map, kind)?));
-            }
-        }
-        Ok((tile, gathered))
+        let gather = |tile: Tile| {
+            let gathered = tile.source_map.iter().flat_map(|source_map| {
+                let gather = |(name, map, kind): &(String, Picture, MapKind)| {
+                    Ok((name.clone(), source_map.apply(map, *kind)?))
+                };
+                others.iter().map(gather)
+            });
+            let gathered = gathered.collect::<Result<Vec<_>>>()?;
+            Ok((tile, gathered))
+        };
+        let tiles = crate::verb::tile::tiles(&ctx, &inputs, &settings, count)?;
+        tiles.into_iter().map(gather).collect::<Result<Vec<_>>>()
     })?;
-    let report = serde_json::to_string(&tile.report)
-        .map_err(|e| Error::Internal { message: e.to_string() })
-        .into_py(py)?;
-    let source_map = tile.source_map.as_ref().map(|map| map_out(py, map)).transpose()?;
-    let maps = gathered
-        .into_iter()
-        .map(|(name, picture)| Ok((name, array_out(py, &picture)?)))
-        .collect::<PyResult<_>>()?;
-    Ok((array_out(py, &tile.picture)?, source_map, maps, report))
+    let out = |(tile, gathered): (Tile, Vec<(String, Picture)>)| {
+        let report = serde_json::to_string(&tile.report)
+            .map_err(|e| Error::Internal { message: e.to_string() })
+            .into_py(py)?;
+        let source_map = tile.source_map.as_ref().map(|map| map_out(py, map)).transpose()?;
+        let maps = gathered
+            .into_iter()
+            .map(|(name, picture)| Ok((name, array_out(py, &picture)?)))
+            .collect::<PyResult<_>>()?;
+        Ok((array_out(py, &tile.picture)?, source_map, maps, report))
+    };
+    made.into_iter().map(out).collect()
 }
 
 /// Gathers a map through a source map.
@@ -235,7 +245,7 @@ mod _texforge {
     #[pymodule_export]
     use super::{
         apply, cli_main, encode_png, error_kinds, fail, map_kind, read, read_source_map, schema,
-        tile, write, write_source_map,
+        tiles, write, write_source_map,
     };
 
     use pyo3::prelude::*;

@@ -2,4 +2,5 @@
 
 pub mod histogram;
 pub mod localhist;
+pub mod lowpass;
 pub mod resample;

@@ -3,6 +3,7 @@
 use crate::base::error::{Error, Result};
 use crate::image::mask::Mask;
 use crate::image::picture::Picture;
+use crate::method::flatten::{self, Flat};
 use crate::verb::tile::TileParams;
 
 /// What a tile is made from.
@@ -43,5 +44,25 @@ impl<'a> Inputs<'a> {
         parts.extend(Mask::from_alpha(self.photo));
         let all = parts.into_iter().map(Ok).reduce(|a, b| a?.and(&b?)).transpose()?;
         Ok(all.filter(|m| m.count() < m.usable().len()))
+    }
+    /// The photo with its light flattened, if `params` want it; `notes` say what was done.
+    pub(super) fn flattened(
+        &self,
+        mask: Option<&Mask>,
+        params: &TileParams,
+        notes: &mut Vec<String>,
+    ) -> Result<Option<Picture>> {
+        if params.flatten <= 0.0 {
+            return Ok(None);
+        }
+        let sigma = f64::from(params.flatten) * self.photo.height().min(self.photo.width()) as f64;
+        let Flat { picture, factors: (low, high), clipped } =
+            flatten::run(self.photo, mask, sigma)?;
+        notes.push(format!(
+            "light flattened over {sigma:.0} pixels: multiplied by {low:.2} to {high:.2}, {:.1} % of \
+             the samples cut off at full scale",
+            clipped * 100.0
+        ));
+        Ok(Some(picture))
     }
 }

@@ -14,13 +14,20 @@ use crate::image::mask::Mask;
 use crate::image::material::MapKind;
 use crate::image::picture::Picture;
 use crate::image::sourcemap::SourceMap;
-use crate::method::{make_seamless, stationary};
+use crate::method::make_seamless;
+use crate::method::stationary::{self, Exemplar};
 use crate::search::patchmatch::Wrap;
 use crate::signal::localhist::Domain;
 use crate::verb::inputs::Inputs;
 
 /// Longest side of a tile, in pixels.
 const MAX_TILE_SIDE: usize = 32_768;
+
+/// Most tiles of one run.
+pub const MAX_VARIANTS: usize = 1000;
+
+/// Least radius of the flattening: what is smaller than this share of the photo is texture.
+const LEAST_FLATTEN: f32 = 0.02;
 
 /// Size of the tile.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -130,6 +137,8 @@ params! {
         quality: Quality = Quality::Normal;
         /// How far the marks of the avoid mask are grown: nothing this near to a mark is copied.
         avoid_grow: usize = 0, in 0..=10000, unit "px";
+        /// Reach of the light flattening, 0.02 or more: differences of light that are wider are taken out of the photo first; 0 switches it off.
+        flatten: f32 = 0.0, in 0.0..=1.0, unit "fraction of the photo's shorter side";
     }
 }
 
@@ -161,7 +170,8 @@ pub struct Report {
     pub tile_size: (usize, usize),
     /// The costs.
     pub costs: Costs,
-    /// Wall time in seconds of each stage, in order. The only part that differs between runs.
+    /// Wall time in seconds of each stage, in order; `analysis` is that of the photo, which the
+    /// variants of a run share. The only part that differs between runs.
     pub seconds: Vec<(&'static str, f64)>,
     /// What the user should know, one sentence each.
     pub notes: Vec<String>,
@@ -170,7 +180,7 @@ pub struct Report {
 /// The result of [`tile`].
 #[derive(Debug, Clone)]
 pub struct Tile {
-    /// The tile, in the photo's own sample type.
+    /// The tile, in the photo's own sample type; of the flattened photo's pixels if it was flattened.
     pub picture: Picture,
     /// Which photo pixel each pixel of the tile is a copy of; `None` for
     /// [`Method::MakeSeamless`], which blends.
@@ -216,56 +226,95 @@ impl TileParams {
 /// [`Error::EmptyMask`], [`Error::SizeMismatch`] (masks), [`Error::NotFinite`], [`Error::Memory`]
 /// (checked before anything is allocated), [`Error::Cancelled`].
 pub fn tile(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, params: &TileParams) -> Result<Tile> {
-    tile_from(ctx, &Inputs { mask, ..Inputs::new(photo) }, params)
+    let one = tiles(ctx, &Inputs { mask, ..Inputs::new(photo) }, params, 1)?.pop();
+    one.ok_or_else(|| Error::Internal { message: "no tile came back".into() })
 }
 
-/// As [`tile`], with everything that a tile can be made from.
+/// As [`tile`], with everything that a tile can be made from, and several times: `count` tiles
+/// whose seeds are `ctx.seed` and those after it. What is learnt about the photo is learnt once.
 ///
 /// # Errors
-/// As [`tile`].
-pub fn tile_from(ctx: &Ctx, inputs: &Inputs<'_>, params: &TileParams) -> Result<Tile> {
-    let photo = inputs.photo;
+/// As [`tile`]; [`Error::Parameter`] for a `count` that is not 1 to 1000 (1 with
+/// [`Method::MakeSeamless`], which makes no random choices) and for seeds beyond the last one.
+pub fn tiles(
+    ctx: &Ctx,
+    inputs: &Inputs<'_>,
+    params: &TileParams,
+    count: usize,
+) -> Result<Vec<Tile>> {
     let start = Instant::now();
-    let (width, height) = check(photo, params)?;
-    let size = (height, width);
+    let (width, height) = check(inputs.photo, params, count)?;
+    let last = ctx.seed.checked_add(count as u64 - 1);
+    if last.is_none() {
+        let expected = format!("at most {} with {count} variants", u64::MAX - (count as u64 - 1));
+        return Err(Error::parameter("seed", expected, ctx.seed));
+    }
     let wrap = Wrap { y: params.axis != Axis::X, x: params.axis != Axis::Y };
     let mask = inputs.usable(params)?;
     let mut notes = Vec::new();
     if mask.is_some() && params.method == Method::MakeSeamless {
         notes.push("the method make-seamless uses the whole photo; the mask is ignored".to_owned());
     }
-
-    let (picture, source_map) = ctx.install(|| {
-        if params.method == Method::MakeSeamless {
-            return Ok((make_seamless::run(photo, size, wrap)?, None));
-        }
-        let plan = plan(params, size, wrap);
-        let map = stationary::run(ctx, photo, mask.as_ref(), &plan)?;
-        Ok((map.apply(photo, MapKind::Color)?, Some(map)))
+    let plan = plan(params, (height, width), wrap);
+    let (flat, exemplar) = ctx.install(|| {
+        let flat = inputs.flattened(mask.as_ref(), params, &mut notes)?;
+        let photo = flat.as_ref().unwrap_or(inputs.photo);
+        let copies = params.method != Method::MakeSeamless;
+        let exemplar =
+            copies.then(|| Exemplar::new(ctx, photo, mask.as_ref(), &plan)).transpose()?;
+        Ok((flat, exemplar))
     })?;
-    let made = start.elapsed();
-    let costs = ctx.install(|| Ok(costs(photo, &picture, source_map.as_ref(), params, wrap)))?;
+    let photo = flat.as_ref().unwrap_or(inputs.photo);
+    let analysed = start.elapsed();
+    ctx.begin(exemplar.as_ref().map_or(0, |e| e.work(&plan) * count as u64));
     let mut resolved = params.clone();
     resolved.size = Size::Pixels { width, height };
-    let report = Report {
-        version: env!("CARGO_PKG_VERSION"),
-        seed: ctx.seed,
-        params: resolved.show(),
-        photo_size: (photo.width(), photo.height()),
-        tile_size: (width, height),
-        costs,
-        seconds: vec![
-            ("synthesis", made.as_secs_f64()),
-            ("costs", start.elapsed().saturating_sub(made).as_secs_f64()),
-        ],
-        notes,
+    let make = |seed: u64| {
+        let start = Instant::now();
+        let ctx = ctx.with_seed(seed);
+        let (picture, source_map) = ctx.install(|| match &exemplar {
+            None => Ok((make_seamless::run(photo, (height, width), wrap)?, None)),
+            Some(exemplar) => {
+                let map = stationary::run(&ctx, exemplar, &plan)?;
+                Ok((map.apply(photo, MapKind::Color)?, Some(map)))
+            }
+        })?;
+        let made = start.elapsed();
+        let costs =
+            ctx.install(|| Ok(costs(photo, &picture, source_map.as_ref(), params, wrap)))?;
+        let report = Report {
+            version: env!("CARGO_PKG_VERSION"),
+            seed,
+            params: resolved.show(),
+            photo_size: (photo.width(), photo.height()),
+            tile_size: (width, height),
+            costs,
+            seconds: vec![
+                ("analysis", analysed.as_secs_f64()),
+                ("synthesis", made.as_secs_f64()),
+                ("costs", start.elapsed().saturating_sub(made).as_secs_f64()),
+            ],
+            notes: notes.clone(),
+        };
+        Ok(Tile { picture, source_map, report })
     };
-    Ok(Tile { picture, source_map, report })
+    (0..count as u64).map(|i| make(ctx.seed + i)).collect()
 }
 
 /// Checks everything that can be known before the work; returns the tile's width and height.
-fn check(photo: &Picture, params: &TileParams) -> Result<(usize, usize)> {
+fn check(photo: &Picture, params: &TileParams, count: usize) -> Result<(usize, usize)> {
     params.validate()?;
+    if !(1..=MAX_VARIANTS).contains(&count) {
+        return Err(Error::parameter("variants", format!("1 to {MAX_VARIANTS}"), count));
+    }
+    if count > 1 && params.method == Method::MakeSeamless {
+        let expected = "1 with the method make-seamless, which makes no random choices";
+        return Err(Error::parameter("variants", expected, count));
+    }
+    if params.flatten > 0.0 && params.flatten < LEAST_FLATTEN {
+        let expected = format!("0 (off) or {LEAST_FLATTEN} to 1; less is texture, not light");
+        return Err(Error::parameter("flatten", expected, params.flatten));
+    }
     if params.patch.is_multiple_of(2) {
         return Err(Error::parameter("patch", "odd, so that a patch has a middle", params.patch));
     }
@@ -299,9 +348,15 @@ fn check(photo: &Picture, params: &TileParams) -> Result<(usize, usize)> {
         ));
     }
     photo.ensure_finite("the photo")?;
-    let need = stationary::memory_bytes((ph, pw), (height, width))
-        .checked_add((width * height) as u64 * (photo.byte_len() / (pw * ph)) as u64);
-    ensure_available(&format!("a {width}x{height} tile from a {pw}x{ph} photo"), need)?;
+    // Every tile with its source map stays until the last is made; the flattened photo is a copy.
+    let tile = (width * height) as u64 * (photo.byte_len() / (pw * ph)) as u64;
+    let others = (tile + 8 * (width * height) as u64).checked_mul(count as u64 - 1);
+    let flat = if params.flatten > 0.0 { photo.byte_len() as u64 } else { 0 };
+    let need = others.and_then(|others| {
+        stationary::memory_bytes((ph, pw), (height, width)).checked_add(tile + flat + others)
+    });
+    let what = if count > 1 { format!("{count} tiles of") } else { "a tile of".to_owned() };
+    ensure_available(&format!("{what} {width}x{height} from a {pw}x{ph} photo"), need)?;
     Ok((width, height))
 }
 

@@ -58,19 +58,43 @@ pub struct Plan {
     pub fine_iterations: u32,
 }
 
-/// Synthesizes a texture from `photo`: where every output pixel comes from.
+/// A photo, analysed: what all runs on it share.
+#[derive(Debug)]
+pub struct Exemplar<'a> {
+    photo: (usize, usize),
+    mask: Option<&'a Mask>,
+    /// Finest first.
+    levels: Vec<Level>,
+}
+
+impl<'a> Exemplar<'a> {
+    /// Analyses `photo`, as far as `mask` lets it be used, for tiles of this plan.
+    ///
+    /// # Errors
+    /// See [`tile`](crate::tile).
+    pub fn new(ctx: &Ctx, photo: &Picture, mask: Option<&'a Mask>, plan: &Plan) -> Result<Self> {
+        let levels = level::build(ctx, photo, mask, plan)?;
+        Ok(Self { photo: (photo.height(), photo.width()), mask, levels })
+    }
+
+    /// Steps of progress that one [`run`] counts.
+    pub fn work(&self, plan: &Plan) -> u64 {
+        let area = |l: &Level| (l.size.0 * l.size.1) as u64;
+        let levels = self.levels.iter().enumerate();
+        levels
+            .map(|(j, l)| u64::from(effort(plan, l, j + 1 == self.levels.len()).0) * area(l))
+            .sum()
+    }
+}
+
+/// Synthesizes a texture from the exemplar: where every output pixel comes from. `ctx.begin` is the
+/// caller's.
 ///
 /// # Errors
 /// See [`tile`](crate::tile).
-pub fn run(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, plan: &Plan) -> Result<SourceMap> {
-    let levels = level::build(ctx, photo, mask, plan)?;
+pub fn run(ctx: &Ctx, exemplar: &Exemplar<'_>, plan: &Plan) -> Result<SourceMap> {
+    let levels = &exemplar.levels;
     let n_coarse = levels.len() - 1;
-    let area = |l: &Level| (l.size.0 * l.size.1) as u64;
-    let work = levels
-        .iter()
-        .enumerate()
-        .map(|(j, l)| u64::from(effort(plan, l, j == n_coarse).0) * area(l));
-    ctx.begin(work.sum());
     let mut pass = 0;
     let mut field: Option<Field> = None;
     for (j, level) in levels.iter().enumerate().rev() {
@@ -116,12 +140,12 @@ pub fn run(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, plan: &Plan) -> Resu
     let votes = vote(ctx.simd, &field, &finest.source, plan.wrap);
     let canvas = seams::Canvas {
         source: &finest.source.image,
-        usable: mask.map(Mask::usable),
+        usable: exemplar.mask.map(Mask::usable),
         target: &without_apron(&votes, plan, plan.size),
         wrap: plan.wrap,
     };
     seams::settle(ctx, &canvas, &mut yx, SEAM_SWEEPS)?;
-    SourceMap::new(plan.size, (photo.height(), photo.width()), yx)
+    SourceMap::new(plan.size, exemplar.photo, yx)
 }
 
 /// Peak memory of [`run`] besides the photo itself, for a photo and an output of these sizes
