@@ -178,8 +178,7 @@ pub(crate) fn exhaustive(
             for y in 0..source.rows() {
                 for x in 0..source.cols() {
                     let pos = Pos::new(y, x);
-                    let dot = kernel.dot(&query, &source.image, source.at(pos));
-                    best = best.min((source.bias(pos) - 2 * dot, pos));
+                    best = best.min((kernel.distance(&query, &source.image, source.at(pos)), pos));
                 }
             }
             best.1

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::base::rng::Rng;
-use crate::search::source::{Source, UNUSABLE};
+use crate::search::source::Source;
 
 /// A patch position (its top left corner) in the source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -86,10 +86,10 @@ impl Field {
                 ty.clamp(0, source.rows() as isize - 1) as usize,
                 tx.clamp(0, source.cols() as isize - 1) as usize,
             );
-            if source.bias(pos) == UNUSABLE {
-                source.random(&mut Rng::new(seed, STAGE, height as u32, i as u64))
-            } else {
+            if source.is_usable(pos) {
                 pos
+            } else {
+                source.random(&mut Rng::new(seed, STAGE, height as u32, i as u64))
             }
         };
         Self { height, width, pos: (0..height * width).into_par_iter().map(item).collect() }

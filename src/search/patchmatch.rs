@@ -99,7 +99,7 @@ impl Usage {
                     sum += weight * (if y >= d { at(y - d) } else { 0.0 });
                     sum += weight * (if y + d < rows { at(y + d) } else { 0.0 });
                 }
-                // Saturates far below UNUSABLE, so that sums with distances cannot overflow.
+                // Saturates: sums with distances cannot overflow, nor reach those of unusable patches.
                 let cost = (sum / (reach * reach) as f32) as f64 * unit;
                 *out = cost.min(f64::from(1 << 28)) as i32;
             }
@@ -205,6 +205,10 @@ impl Band<'_> {
         let radii = self.radii();
         let mut query = kernel.query();
         let mut candidates = [Pos::new(0, 0); 3 + MAX_RANDOM];
+        let mut distances = [0; 3 + MAX_RANDOM];
+        // The distances of the matches in the row that the scan has just left.
+        let mut row_distances = vec![0; width];
+        let mut random = vec![Pos::new(0, 0); width * radii.len()];
         for step in 0..n_rows {
             let row = if backward { n_rows - 1 - step } else { step };
             let y = y0 + row;
@@ -216,40 +220,88 @@ impl Band<'_> {
                 from[..width].to_vec()
             });
             let row = &mut rows[row * width..(row + 1) * width];
+            // Drawn for the whole row ahead: the search need not wait for the dice.
+            let items = (y * width..).zip(row.iter());
+            for ((item, own), out) in items.zip(random.chunks_exact_mut(radii.len().max(1))) {
+                self.random_candidates(*own, &radii, item, out);
+            }
             let end = if backward { 0 } else { width - 1 };
             let mut beside = self.wrap.x.then(|| row[end]);
-            for step in 0..width {
-                let x = if backward { width - 1 - step } else { step };
+            for at in 0..width {
+                let x = if backward { width - 1 - at } else { at };
                 kernel.hold(&mut query, self.target, self.target.at(y, x));
                 let own = row[x];
                 candidates[0] = own;
                 let mut n = 1;
-                let neighbors = [
-                    beside.and_then(|p| p.shifted(0, d, self.source)),
-                    above.as_ref().and_then(|row| row[x].shifted(d, 0, self.source)),
-                ];
-                for candidate in neighbors.into_iter().flatten() {
-                    if candidate != own {
-                        candidates[n] = candidate;
+                // The index of a candidate, which is added if it is new.
+                let mut add = |pos: Pos| {
+                    candidates[..n].iter().position(|&p| p == pos).unwrap_or_else(|| {
+                        candidates[n] = pos;
                         n += 1;
-                    }
+                        n - 1
+                    })
+                };
+                beside.and_then(|p| p.shifted(0, d, self.source)).map(&mut add);
+                let above = above.as_ref().and_then(|row| row[x].shifted(d, 0, self.source));
+                let known = above.map(|pos| (add(pos), pos)).filter(|_| step > 0);
+                for &pos in &random[x * radii.len()..][..radii.len()] {
+                    candidates[n] = pos;
+                    n += 1;
                 }
-                self.random_candidates(own, &radii, y * width + x, &mut candidates[n..]);
-                n += radii.len();
+                // A match that moved by a row along with its pixel has lost one row of differences
+                // and won another: no need to sum the others again.
+                let known = known.map_or(usize::MAX, |(i, pos)| {
+                    distances[i] = self.moved(kernel, row_distances[x], (y, x), pos, backward);
+                    debug_assert_eq!(
+                        distances[i],
+                        self.distance(kernel, &query, pos),
+                        "moved to {pos:?}"
+                    );
+                    i
+                });
                 // All are scored before any is chosen: nothing waits for a comparison, and the
                 // memory of one patch is fetched while another is multiplied. The first of equals
                 // wins.
                 let mut best = i64::MAX;
                 for (i, &candidate) in candidates[..n].iter().enumerate() {
-                    let score = self.score(kernel, &query, candidate);
+                    if i != known {
+                        distances[i] = self.distance(kernel, &query, candidate);
+                    }
+                    let score = self.score(candidate, distances[i]);
                     best = best.min((i64::from(score) << 8) | i as i64);
                 }
-                row[x] = candidates[(best & 0xff) as usize];
+                let best = (best & 0xff) as usize;
+                row[x] = candidates[best];
+                row_distances[x] = distances[best];
                 beside = Some(row[x]);
             }
             ctx.step(width as u64)?;
         }
         Ok(())
+    }
+
+    /// The distance of the target's patch at (`y`, `x`) from the source's at `pos`, from that of the
+    /// two patches one row before (in scan direction).
+    #[inline(always)]
+    fn moved<K: Kernel>(
+        &self,
+        kernel: K,
+        before: i32,
+        (y, x): (usize, usize),
+        pos: Pos,
+        backward: bool,
+    ) -> i32 {
+        // Forward, the row below the patch enters and its top leaves; backward, its top enters
+        // and the row below it leaves.
+        let n = self.source.patch;
+        let (enter, leave) = if backward { (0, n) } else { (n - 1, usize::MAX) };
+        let rows = |image: &MatchImage, y: usize, x: usize| {
+            [enter, leave].map(|row| image.at(y.wrapping_add(row), x))
+        };
+        let (target, source) = (self.target, &self.source.image);
+        let change = kernel
+            .row_change((target, rows(target, y, x)), (source, rows(source, pos.y(), pos.x())));
+        before + change
     }
 
     /// Radius of each random candidate.
@@ -276,12 +328,17 @@ impl Band<'_> {
         }
     }
 
-    /// Squared distance less the constant `|f|^2`, plus the usage cost. Unusable patches score
-    /// beyond all others: every field starts with usable ones, and keeps them.
+    /// Squared distance of the held patch from the source's at `pos`.
     #[inline(always)]
-    fn score<K: Kernel>(&self, kernel: K, query: &K::Query, pos: Pos) -> i32 {
-        let dot = kernel.dot(query, &self.source.image, self.source.at(pos));
-        self.source.bias(pos) + self.usage.cost(pos) - 2 * dot
+    fn distance<K: Kernel>(&self, kernel: K, query: &K::Query, pos: Pos) -> i32 {
+        kernel.distance(query, &self.source.image, self.source.at(pos))
+    }
+
+    /// Squared distance plus the usage cost. Unusable patches score beyond all others: every field
+    /// starts with usable ones, and keeps them.
+    #[inline(always)]
+    fn score(&self, pos: Pos, distance: i32) -> i32 {
+        if self.source.is_usable(pos) { distance + self.usage.cost(pos) } else { i32::MAX }
     }
 }
 
@@ -309,11 +366,9 @@ pub fn distances(simd: Simd, target: &MatchImage, source: &Source, field: &Field
             let mut query = kernel.query();
             (0..field.width)
                 .map(|x| {
-                    let at = target.at(y, x);
-                    kernel.hold(&mut query, target, at);
+                    kernel.hold(&mut query, target, target.at(y, x));
                     let pos = field.pos[y * field.width + x];
-                    let own = kernel.dot(&query, target, at);
-                    own + source.bias(pos) - 2 * kernel.dot(&query, &source.image, source.at(pos))
+                    kernel.distance(&query, &source.image, source.at(pos))
                 })
                 .collect()
         }

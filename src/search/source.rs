@@ -5,21 +5,22 @@ use rayon::prelude::*;
 use crate::search::field::Pos;
 use crate::search::patch::MatchImage;
 
-/// Bias of a patch that must not be used: larger than any distance.
-pub const UNUSABLE: i32 = i32::MAX / 2;
-
-/// Picture to copy from, in the matching space, and the squared norm of each of its patches.
+/// Picture to copy from, in the matching space, and which of its patches may be used.
 #[derive(Debug)]
 pub struct Source {
     /// The codes.
     pub image: MatchImage,
     /// Patch side.
     pub patch: usize,
-    /// `|e_q|^2` for every patch position q (top left corner), or [`UNUSABLE`]; row by row,
-    /// `rows() * cols()`.
-    bias: Vec<i32>,
-    /// Usable positions, if not all of them are.
-    usable: Option<Vec<Pos>>,
+    /// What is usable, if not all positions are.
+    usable: Option<Usable>,
+}
+
+#[derive(Debug)]
+struct Usable {
+    /// For every patch position (top left corner), row by row, `rows() * cols()`.
+    flags: Vec<bool>,
+    list: Vec<Pos>,
 }
 
 impl Source {
@@ -30,34 +31,20 @@ impl Source {
         if h < patch || w < patch {
             return None;
         }
-        let mut bias = box_sums(h, w, patch, |y, row| {
-            let codes = image.row(y);
-            for (sum, px) in row.iter_mut().zip(codes.chunks_exact(4)) {
-                *sum = px.iter().map(|&c| c as i32 * c as i32).sum();
+        let Some(mask) = mask.filter(|m| m.iter().any(|&ok| !ok)) else {
+            return Some(Self { image, patch, usable: None });
+        };
+        let bad = box_sums(h, w, patch, |y, row| {
+            for (sum, &ok) in row.iter_mut().zip(&mask[y * w..(y + 1) * w]) {
+                *sum = i32::from(!ok);
             }
         });
-        let mut usable = None;
-        if let Some(mask) = mask.filter(|m| m.iter().any(|&ok| !ok)) {
-            let bad = box_sums(h, w, patch, |y, row| {
-                for (sum, &ok) in row.iter_mut().zip(&mask[y * w..(y + 1) * w]) {
-                    *sum = i32::from(!ok);
-                }
-            });
-            let cols = w - patch + 1;
-            let mut list = Vec::new();
-            for (at, (bias, &bad)) in bias.iter_mut().zip(&bad).enumerate() {
-                if bad > 0 {
-                    *bias = UNUSABLE;
-                } else {
-                    list.push(Pos::new(at / cols, at % cols));
-                }
-            }
-            if list.is_empty() {
-                return None;
-            }
-            usable = Some(list);
-        }
-        Some(Self { image, patch, bias, usable })
+        let cols = w - patch + 1;
+        let flags: Vec<bool> = bad.iter().map(|&bad| bad == 0).collect();
+        let some = flags.iter().enumerate().filter(|(_, ok)| **ok);
+        let list: Vec<Pos> = some.map(|(at, _)| Pos::new(at / cols, at % cols)).collect();
+        let usable = Some(Usable { flags, list }).filter(|u| !u.list.is_empty())?;
+        Some(Self { image, patch, usable: Some(usable) })
     }
 
     /// Number of patch positions vertically.
@@ -72,13 +59,13 @@ impl Source {
 
     /// Number of usable patch positions.
     pub fn n_usable(&self) -> usize {
-        self.usable.as_ref().map_or(self.bias.len(), Vec::len)
+        self.usable.as_ref().map_or(self.rows() * self.cols(), |u| u.list.len())
     }
 
-    /// `|e_q|^2`, or [`UNUSABLE`].
+    /// Whether the patch at `pos` may be used.
     #[inline]
-    pub fn bias(&self, pos: Pos) -> i32 {
-        self.bias[pos.y() * self.cols() + pos.x()]
+    pub fn is_usable(&self, pos: Pos) -> bool {
+        self.usable.as_ref().is_none_or(|u| u.flags[pos.y() * self.cols() + pos.x()])
     }
 
     /// Pixel index of the top left corner of the patch at `pos`.
@@ -90,7 +77,7 @@ impl Source {
     /// A usable position, uniform in the random number.
     pub fn random(&self, rng: &mut crate::base::rng::Rng) -> Pos {
         match &self.usable {
-            Some(list) => list[rng.below(list.len() as u32) as usize],
+            Some(Usable { list, .. }) => list[rng.below(list.len() as u32) as usize],
             None => Pos::new(
                 rng.below(self.rows() as u32) as usize,
                 rng.below(self.cols() as u32) as usize,
@@ -163,7 +150,7 @@ mod tests {
         for y in 0..6 {
             for x in 0..6 {
                 let covers = (y..y + 3).contains(&3) && (x..x + 3).contains(&3);
-                assert_eq!(source.bias(Pos::new(y, x)) == UNUSABLE, covers, "at {y}, {x}");
+                assert_eq!(source.is_usable(Pos::new(y, x)), !covers, "at {y}, {x}");
             }
         }
         assert!(Source::new(MatchImage::new(8, 8), 3, Some(&[false; 64])).is_none());

@@ -7,7 +7,7 @@ use texforge::search::patch::{
 };
 use texforge::search::patchmatch::{self, Search, Usage, Wrap};
 use texforge::search::seams::{self, Canvas, From};
-use texforge::search::source::{Source, UNUSABLE};
+use texforge::search::source::Source;
 use texforge::search::vote::vote;
 use texforge::signal::histogram::SOFT_BITS;
 use texforge::{Ctx, Simd};
@@ -54,20 +54,30 @@ fn random_field(height: usize, width: usize, source: &Source, seed: u64) -> Fiel
     Field::random(height, width, source, seed)
 }
 
-/// Inner products by a kernel, the query held again for each pair.
-struct Dots<'a>(&'a MatchImage, &'a MatchImage, &'a [(usize, usize)]);
+/// Distances by a kernel, the query held again for each pair, and how they change when both
+/// patches move down by a row (where both can).
+struct Distances<'a>(&'a MatchImage, &'a MatchImage, &'a [(usize, usize)], usize);
 
-impl WithKernel for Dots<'_> {
-    type Output = Vec<i32>;
+impl WithKernel for Distances<'_> {
+    type Output = (Vec<i32>, Vec<i32>);
     #[expect(clippy::inline_always, reason = "the trait demands it")]
     #[inline(always)]
-    fn run<K: Kernel>(self, kernel: K) -> Vec<i32> {
+    fn run<K: Kernel>(self, kernel: K) -> Self::Output {
+        let Self(image_a, image_b, pairs, n) = self;
         let mut query = kernel.query();
-        let dot = |&(a, b): &(usize, usize)| {
-            kernel.hold(&mut query, self.0, a);
-            kernel.dot(&query, self.1, b)
+        let distance = |&(a, b): &(usize, usize)| {
+            kernel.hold(&mut query, image_a, a);
+            kernel.distance(&query, image_b, b)
         };
-        self.2.iter().map(dot).collect()
+        let change = |&(a, b): &(usize, usize)| {
+            let rows = |m: &MatchImage, at: usize| [at + n * m.stride(), at];
+            kernel.row_change((image_a, rows(image_a, a)), (image_b, rows(image_b, b)))
+        };
+        let movable = |&&(a, b): &&(usize, usize)| {
+            let fits = |m: &MatchImage, at: usize| at / m.stride() + n < m.height();
+            fits(image_a, a) && fits(image_b, b)
+        };
+        (pairs.iter().map(distance).collect(), pairs.iter().filter(movable).map(change).collect())
     }
 }
 
@@ -82,7 +92,7 @@ mod kernels {
         for y in 0..n {
             for x in 0..n {
                 let (u, v) = (px(a, a_at, y, x), px(b, b_at, y, x));
-                sum += (0..4).map(|k| i32::from(u[k]) * i32::from(v[k])).sum::<i32>();
+                sum += (0..4).map(|k| (i32::from(u[k]) - i32::from(v[k])).pow(2)).sum::<i32>();
             }
         }
         sum
@@ -90,7 +100,7 @@ mod kernels {
 
     /// Every level, odd and even patches, tight and ragged widths, first, last and random places.
     #[test]
-    fn every_level_gives_the_inner_product_by_its_definition() {
+    fn every_level_gives_the_distance_by_its_definition() {
         for n in 1..=PATCH_MAX {
             for (more_y, more_x) in [(0, 0), (1, 0), (0, 1), (5, 13), (9, 30)] {
                 let a = random_image(n + more_y, n + more_x, 1);
@@ -106,27 +116,39 @@ mod kernels {
                 };
                 let pairs: Vec<_> = (0..12).map(|i| (place(&a, i), place(&b, i))).collect();
                 let want: Vec<_> = pairs.iter().map(|&(u, v)| naive(&a, u, &b, v, n)).collect();
+                let down = |m: &MatchImage, at: usize| {
+                    (at / m.stride() + n < m.height()).then(|| at + m.stride())
+                };
+                let moved = |(&(u, v), was): (&(usize, usize), &i32)| {
+                    Some(naive(&a, down(&a, u)?, &b, down(&b, v)?, n) - was)
+                };
+                let changes: Vec<_> = pairs.iter().zip(&want).filter_map(moved).collect();
+                assert!(more_y * more_x == 0 || !changes.is_empty(), "nothing can move");
                 for level in LEVELS {
-                    let got = with_kernel(level, n, Dots(&a, &b, &pairs));
-                    assert_eq!(got, want, "{level:?} patch {n}, {more_y} and {more_x} more");
+                    let got = with_kernel(level, n, Distances(&a, &b, &pairs, n));
+                    let what = format!("{level:?} patch {n}, {more_y} and {more_x} more");
+                    assert_eq!(got, (want.clone(), changes.clone()), "{what}");
                 }
-                for (&(u, v), &dot) in pairs.iter().zip(&want) {
-                    let norms = naive(&a, u, &a, u, n) + naive(&b, v, &b, v, n);
-                    assert_eq!(distance_squared(&a, u, &b, v, n), norms - 2 * dot, "patch {n}");
+                for (&(u, v), &want) in pairs.iter().zip(&want) {
+                    assert_eq!(distance_squared(&a, u, &b, v, n), want, "patch {n}");
                 }
             }
         }
     }
 
-    /// Codes at their limit: nothing saturates, at any level, for the largest patch.
+    /// Codes as far apart as they can be: nothing saturates, at any level, for the largest patch.
     #[test]
-    fn the_largest_codes_do_not_saturate() {
+    fn the_largest_differences_do_not_saturate() {
         let n = PATCH_MAX;
         let full = image(n, n, |_, _| [255; 4]);
+        let empty = MatchImage::new(n, n);
         assert_eq!(full.pixel(0, 0), [CODE_MAX; 4], "cut to the largest code");
         let want = (4 * n * n) as i32 * i32::from(CODE_MAX).pow(2);
         for level in LEVELS {
-            assert_eq!(with_kernel(level, n, Dots(&full, &full, &[(0, 0)])), [want], "{level:?}");
+            for (a, b) in [(&full, &empty), (&empty, &full)] {
+                let got = with_kernel(level, n, Distances(a, b, &[(0, 0)], n)).0;
+                assert_eq!(got, [want], "{level:?}");
+            }
         }
     }
 
@@ -352,7 +374,7 @@ mod fields {
                     (0..patch * patch).all(|i| mask[(p.y() + i / patch) * w + p.x() + i % patch])
                 });
                 assert!(ok, "{what}, patch {patch}");
-                assert!(field.pos.iter().all(|&p| source.bias(p) != UNUSABLE), "{what}");
+                assert!(field.pos.iter().all(|&p| source.is_usable(p)), "{what}");
             };
             // The target is the masked half itself: the best matches are all forbidden.
             let target = image(24 + patch - 1, 24 + patch - 1, |y, x| {

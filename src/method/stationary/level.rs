@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use crate::search::field::Pos;
 use crate::search::patch::{CODE_MAX, MatchImage};
-use crate::search::source::{Source, UNUSABLE};
+use crate::search::source::Source;
 use crate::signal::histogram::{Distribution, Quantiles, SOFT_BITS, Soft};
 use crate::signal::localhist::{Domain, LocalDistributions};
 use crate::signal::resample::{resized, resized_mask};
@@ -225,7 +225,7 @@ fn typical_quantiles(source: &Source) -> [Option<Quantiles>; CONTRAST] {
         .map(|i| {
             let (y, x) = (i / width, i % width);
             let px = source.image.pixel(y + half, x + half);
-            (px.map(|c| u16::from(c) << SOFT_BITS), source.bias(Pos::new(y, x)) != UNUSABLE)
+            (px.map(|c| u16::from(c) << SOFT_BITS), source.is_usable(Pos::new(y, x)))
         })
         .unzip();
     let domain = Domain { height, width, wrap_y: false, wrap_x: false };

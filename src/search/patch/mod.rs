@@ -1,10 +1,11 @@
 //! Patch distance: the kernel everything waits for.
 //!
-//! A [`MatchImage`] holds 7-bit codes of the matching space, four bytes a pixel. With codes below
-//! 128 an inner product of two patches is exact in every instruction set's cheapest
-//! multiply-add (`vpdpbusd`, `vpmaddubsw` without saturation, plain Rust), so that
-//! `|f - e|^2 = |f|^2 + |e|^2 - 2 f.e` costs one load and one multiply-add per patch row, all
-//! levels give the same integer, and the constant terms come from a table.
+//! A [`MatchImage`] holds 7-bit codes of the matching space, four bytes a pixel. The difference of
+//! two codes below 128 fits into a signed byte, and its square's sums into every instruction set's
+//! cheapest multiply-add (`vpdpbusd`, `vpmaddubsw` without saturation, plain Rust): one load and
+//! three instructions per patch row, and all levels give the same integer. (`|e|^2 - 2 e.f` needs
+//! only one instruction a row, but a table of `|e|^2`, and looking that up at random places costs
+//! more than it saves.)
 
 mod scalar;
 mod simd;
@@ -96,7 +97,7 @@ impl MatchImage {
     }
 }
 
-/// An inner-product kernel of one instruction set, for patches of a fixed side.
+/// A patch distance of one instruction set, for patches of a fixed side.
 pub trait Kernel: Copy + Send + Sync {
     /// The rows of one patch, held ready.
     type Query;
@@ -107,9 +108,14 @@ pub trait Kernel: Copy + Send + Sync {
     /// Holds the patch of `image` whose top left pixel has index `at` ready.
     fn hold(&self, query: &mut Self::Query, image: &MatchImage, at: usize);
 
-    /// Inner product of the held patch and the patch of `image` whose top left pixel has index
-    /// `at` (over rows, columns and channels).
-    fn dot(&self, query: &Self::Query, image: &MatchImage, at: usize) -> i32;
+    /// Squared distance between the held patch and the patch of `image` whose top left pixel has
+    /// index `at`: the sum over rows, columns and channels.
+    fn distance(&self, query: &Self::Query, image: &MatchImage, at: usize) -> i32;
+
+    /// How the squared distance of two patches changes when both move by a row: that of the rows
+    /// that enter less that of the rows that leave. `a` and `b` are a picture with the pixel
+    /// indices where its entering and its leaving row (of one patch side) begin.
+    fn row_change(&self, a: (&MatchImage, [usize; 2]), b: (&MatchImage, [usize; 2])) -> i32;
 }
 
 /// Work that wants a [`Kernel`]; [`with_kernel`] calls it with the best one.

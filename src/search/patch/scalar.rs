@@ -25,16 +25,27 @@ impl Kernel for Scalar {
     }
 
     #[inline]
-    fn dot(&self, query: &Vec<u8>, image: &MatchImage, at: usize) -> i32 {
+    fn distance(&self, query: &Vec<u8>, image: &MatchImage, at: usize) -> i32 {
         let n = self.patch;
-        let mut sum = 0;
-        for (row, held) in query.chunks_exact(4 * n).enumerate() {
-            let start = (at + row * image.stride) * 4;
-            let other = &image.codes[start..start + 4 * n];
-            sum += held.iter().zip(other).map(|(&a, &b)| a as i32 * b as i32).sum::<i32>();
-        }
-        sum
+        let rows = query.chunks_exact(4 * n).enumerate();
+        rows.map(|(row, held)| squares(held, image.codes_from(at + row * image.stride, 4 * n)))
+            .sum()
     }
+
+    #[inline]
+    fn row_change(&self, a: (&MatchImage, [usize; 2]), b: (&MatchImage, [usize; 2])) -> i32 {
+        let distance = |i: usize| {
+            let [a, b] = [a, b].map(|(image, at)| image.codes_from(at[i], 4 * self.patch));
+            squares(a, b)
+        };
+        distance(0) - distance(1)
+    }
+}
+
+/// Sum of the squared differences.
+#[inline]
+fn squares(a: &[u8], b: &[u8]) -> i32 {
+    a.iter().zip(b).map(|(&a, &b)| (a as i32 - b as i32).pow(2)).sum()
 }
 
 /// Squared distance of two patches by its definition: the sum over rows, columns and channels of

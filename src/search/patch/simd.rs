@@ -53,11 +53,11 @@ mod x86 {
     use super::super::{Kernel, MatchImage, PATCH_MAX, WithKernel};
     use super::TAIL;
 
-    /// Panics unless the patch at pixel index `at`, and 64 bytes from any place inside it, may be
-    /// read; returns a pointer to its first pixel.
+    /// Panics unless `rows` rows of `patch` pixels at pixel index `at`, and 64 bytes from any place
+    /// inside them, may be read; returns a pointer to the first pixel.
     #[inline(always)]
-    fn checked(image: &MatchImage, at: usize, patch: usize) -> *const u8 {
-        let end = (at + (patch - 1) * image.stride + patch) * 4;
+    fn checked(image: &MatchImage, at: usize, patch: usize, rows: usize) -> *const u8 {
+        let end = (at + (rows - 1) * image.stride + patch) * 4;
         assert!(end + TAIL <= image.codes.len(), "patch outside its picture");
         // SAFETY: `at * 4 <= end`, which lies inside the allocation by the line above.
         unsafe { image.codes.as_ptr().add(at * 4) }
@@ -97,6 +97,32 @@ mod x86 {
         }
     }
 
+    /// `sum` plus the squared differences of the bytes that `inside` selects, in groups of four.
+    ///
+    /// # Safety
+    /// The CPU must have the features of `M`.
+    #[inline(always)]
+    unsafe fn add_squares<M: MultiplyAdd512>(
+        sum: __m512i,
+        f: __m512i,
+        e: __m512i,
+        inside: __mmask64,
+    ) -> __m512i {
+        // SAFETY: the caller's promise. Codes have seven bits: their difference fits into eight.
+        unsafe {
+            let difference = _mm512_abs_epi8(_mm512_maskz_sub_epi8(inside, f, e));
+            M::multiply_add(sum, difference, difference)
+        }
+    }
+
+    /// Bytes of a patch row of `patch` pixels that fall into its first 16 pixels, and those that
+    /// fall into the next.
+    #[inline(always)]
+    fn inside(patch: usize) -> [__mmask64; 2] {
+        let bits = (1u128 << (4 * patch)) - 1;
+        [bits as u64, (bits >> 64) as u64]
+    }
+
     /// The default patch side: a row is one register, and all rows stay in registers.
     #[derive(Debug, Clone, Copy)]
     struct Eleven<M>(std::marker::PhantomData<M>);
@@ -112,31 +138,62 @@ mod x86 {
 
         #[inline(always)]
         fn hold(&self, query: &mut [__m512i; 11], image: &MatchImage, at: usize) {
-            let start = checked(image, at, 11);
+            let start = checked(image, at, 11, 11);
             for (row, held) in query.iter_mut().enumerate() {
-                // SAFETY: inside the picture by `checked`; features as above. The mask cuts the
-                // row at its eleventh pixel, so that longer reads of the other side do no harm.
-                *held = unsafe {
-                    _mm512_maskz_loadu_epi32(0x7ff, start.add(row * image.stride * 4).cast())
-                };
+                // SAFETY: inside the picture, or its tail, by `checked`; features as above.
+                *held = unsafe { _mm512_loadu_si512(start.add(row * image.stride * 4).cast()) };
             }
         }
 
         #[inline(always)]
-        fn dot(&self, query: &[__m512i; 11], image: &MatchImage, at: usize) -> i32 {
-            let start = checked(image, at, 11);
+        fn distance(&self, query: &[__m512i; 11], image: &MatchImage, at: usize) -> i32 {
+            let start = checked(image, at, 11, 11);
             let stride = image.stride * 4;
+            let [inside, _] = inside(11);
             // SAFETY: inside the picture, or its tail, by `checked`; features as above.
             unsafe {
                 // Two sums, so that no multiply-add waits for the one before it.
                 let mut sums = [_mm512_setzero_si512(); 2];
                 for (row, &f) in query.iter().enumerate() {
                     let e = _mm512_loadu_si512(start.add(row * stride).cast());
-                    sums[row % 2] = M::multiply_add(sums[row % 2], f, e);
+                    sums[row % 2] = add_squares::<M>(sums[row % 2], f, e, inside);
                 }
                 _mm512_reduce_add_epi32(_mm512_add_epi32(sums[0], sums[1]))
             }
         }
+
+        #[inline(always)]
+        fn row_change(&self, a: (&MatchImage, [usize; 2]), b: (&MatchImage, [usize; 2])) -> i32 {
+            row_change_512::<M>(11, a, b)
+        }
+    }
+
+    /// See [`Kernel::row_change`].
+    #[inline(always)]
+    fn row_change_512<M: MultiplyAdd512>(
+        patch: usize,
+        a: (&MatchImage, [usize; 2]),
+        b: (&MatchImage, [usize; 2]),
+    ) -> i32 {
+        let inside = inside(patch);
+        // No closures: they would not be compiled for the instruction set.
+        // SAFETY: a kernel exists only inside `run_*`, where the features are.
+        let mut sums = [unsafe { _mm512_setzero_si512() }; 2];
+        for (i, sum) in sums.iter_mut().enumerate() {
+            let (a, b) = (checked(a.0, a.1[i], patch, 1), checked(b.0, b.1[i], patch, 1));
+            // SAFETY: inside the pictures, or their tails, by `checked`; features as above.
+            unsafe {
+                let (f, e) = (_mm512_loadu_si512(a.cast()), _mm512_loadu_si512(b.cast()));
+                *sum = add_squares::<M>(*sum, f, e, inside[0]);
+                if patch > 16 {
+                    let f = _mm512_loadu_si512(a.add(64).cast());
+                    let e = _mm512_loadu_si512(b.add(64).cast());
+                    *sum = add_squares::<M>(*sum, f, e, inside[1]);
+                }
+            }
+        }
+        // SAFETY: features as above.
+        unsafe { _mm512_reduce_add_epi32(_mm512_sub_epi32(sums[0], sums[1])) }
     }
 
     /// Any patch side: a row is one register or two.
@@ -157,37 +214,40 @@ mod x86 {
 
         #[inline(always)]
         fn hold(&self, query: &mut Self::Query, image: &MatchImage, at: usize) {
-            let start = checked(image, at, self.patch);
-            let mask = (1u32 << self.patch) - 1;
+            let start = checked(image, at, self.patch, self.patch);
             for (row, held) in query[..self.patch].iter_mut().enumerate() {
                 // SAFETY: inside the picture, or its tail, by `checked`; features as above.
                 *held = unsafe {
                     let row = start.add(row * image.stride * 4);
-                    [
-                        _mm512_maskz_loadu_epi32(mask as u16, row.cast()),
-                        _mm512_maskz_loadu_epi32((mask >> 16) as u16, row.add(64).cast()),
-                    ]
+                    [_mm512_loadu_si512(row.cast()), _mm512_loadu_si512(row.add(64).cast())]
                 };
             }
         }
 
         #[inline(always)]
-        fn dot(&self, query: &Self::Query, image: &MatchImage, at: usize) -> i32 {
-            let start = checked(image, at, self.patch);
+        fn distance(&self, query: &Self::Query, image: &MatchImage, at: usize) -> i32 {
+            let start = checked(image, at, self.patch, self.patch);
             let stride = image.stride * 4;
+            let inside = inside(self.patch);
             // SAFETY: inside the picture, or its tail, by `checked`; features as above.
             unsafe {
                 let mut sums = [_mm512_setzero_si512(); 2];
                 for (row, held) in query[..self.patch].iter().enumerate() {
                     let row = start.add(row * stride);
-                    sums[0] = M::multiply_add(sums[0], held[0], _mm512_loadu_si512(row.cast()));
+                    let e = _mm512_loadu_si512(row.cast());
+                    sums[0] = add_squares::<M>(sums[0], held[0], e, inside[0]);
                     if self.patch > 16 {
                         let e = _mm512_loadu_si512(row.add(64).cast());
-                        sums[1] = M::multiply_add(sums[1], held[1], e);
+                        sums[1] = add_squares::<M>(sums[1], held[1], e, inside[1]);
                     }
                 }
                 _mm512_reduce_add_epi32(_mm512_add_epi32(sums[0], sums[1]))
             }
+        }
+
+        #[inline(always)]
+        fn row_change(&self, a: (&MatchImage, [usize; 2]), b: (&MatchImage, [usize; 2])) -> i32 {
+            row_change_512::<M>(self.patch, a, b)
         }
     }
 
@@ -203,6 +263,44 @@ mod x86 {
         fn side(self) -> usize {
             if N == 0 { self.patch } else { N }
         }
+
+        /// Squared differences of the `i`-th eight pixels of two rows, in groups of four; zero
+        /// beyond the patch's right end.
+        ///
+        /// # Safety
+        /// The CPU has AVX2.
+        #[inline(always)]
+        unsafe fn squares(self, f: __m256i, e: __m256i, i: usize) -> __m256i {
+            let inside = self.side() as i32 - 8 * i as i32;
+            // SAFETY: the caller's promise. Codes have seven bits: their difference fits into
+            // eight, and two squares of it into sixteen.
+            unsafe {
+                let mut difference = _mm256_abs_epi8(_mm256_sub_epi8(f, e));
+                if inside < 8 {
+                    let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+                    let mask = _mm256_cmpgt_epi32(_mm256_set1_epi32(inside), lanes);
+                    difference = _mm256_and_si256(difference, mask);
+                }
+                let pairs = _mm256_maddubs_epi16(difference, difference);
+                _mm256_madd_epi16(pairs, _mm256_set1_epi16(1))
+            }
+        }
+
+        /// Sum of the eight numbers.
+        ///
+        /// # Safety
+        /// The CPU has AVX2.
+        #[inline(always)]
+        unsafe fn total(sum: __m256i) -> i32 {
+            // SAFETY: the caller's promise.
+            unsafe {
+                let sum =
+                    _mm_add_epi32(_mm256_castsi256_si128(sum), _mm256_extracti128_si256::<1>(sum));
+                let sum = _mm_add_epi32(sum, _mm_shuffle_epi32::<0b01_00_11_10>(sum));
+                let sum = _mm_add_epi32(sum, _mm_shuffle_epi32::<0b10_11_00_01>(sum));
+                _mm_cvtsi128_si32(sum)
+            }
+        }
     }
 
     impl<const N: usize> Kernel for Any256<N> {
@@ -217,45 +315,54 @@ mod x86 {
         #[inline(always)]
         fn hold(&self, query: &mut Self::Query, image: &MatchImage, at: usize) {
             let n = self.side();
-            let start = checked(image, at, n);
+            let start = checked(image, at, n, n);
             for (row, held) in query[..n].iter_mut().enumerate() {
                 for (i, held) in held.iter_mut().enumerate().take(n.div_ceil(8)) {
-                    // Lanes of pixels beyond the patch's right end are zero.
-                    let inside = n as i32 - 8 * i as i32;
                     // SAFETY: inside the picture, or its tail, by `checked`; feature as above.
                     *held = unsafe {
-                        let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
-                        let mask = _mm256_cmpgt_epi32(_mm256_set1_epi32(inside), lanes);
-                        let at = start.add(row * image.stride * 4 + 32 * i);
-                        _mm256_and_si256(_mm256_loadu_si256(at.cast()), mask)
+                        _mm256_loadu_si256(start.add(row * image.stride * 4 + 32 * i).cast())
                     };
                 }
             }
         }
 
         #[inline(always)]
-        fn dot(&self, query: &Self::Query, image: &MatchImage, at: usize) -> i32 {
+        fn distance(&self, query: &Self::Query, image: &MatchImage, at: usize) -> i32 {
             let n = self.side();
-            let start = checked(image, at, n);
+            let start = checked(image, at, n, n);
             let stride = image.stride * 4;
             // SAFETY: inside the picture, or its tail, by `checked`; feature as above.
             unsafe {
-                let one = _mm256_set1_epi16(1);
                 let mut sums = [_mm256_setzero_si256(); 3];
                 for (row, held) in query[..n].iter().enumerate() {
                     for (i, &f) in held.iter().enumerate().take(n.div_ceil(8)) {
                         let e = _mm256_loadu_si256(start.add(row * stride + 32 * i).cast());
-                        let pairs = _mm256_maddubs_epi16(f, e);
-                        sums[i] = _mm256_add_epi32(sums[i], _mm256_madd_epi16(pairs, one));
+                        sums[i] = _mm256_add_epi32(sums[i], self.squares(f, e, i));
                     }
                 }
-                let sum = _mm256_add_epi32(_mm256_add_epi32(sums[0], sums[1]), sums[2]);
-                let sum =
-                    _mm_add_epi32(_mm256_castsi256_si128(sum), _mm256_extracti128_si256::<1>(sum));
-                let sum = _mm_add_epi32(sum, _mm_shuffle_epi32::<0b01_00_11_10>(sum));
-                let sum = _mm_add_epi32(sum, _mm_shuffle_epi32::<0b10_11_00_01>(sum));
-                _mm_cvtsi128_si32(sum)
+                Self::total(_mm256_add_epi32(_mm256_add_epi32(sums[0], sums[1]), sums[2]))
             }
+        }
+
+        #[inline(always)]
+        fn row_change(&self, a: (&MatchImage, [usize; 2]), b: (&MatchImage, [usize; 2])) -> i32 {
+            let n = self.side();
+            // No closures: they would not be compiled for the instruction set.
+            // SAFETY: feature as above.
+            let mut sums = [unsafe { _mm256_setzero_si256() }; 2];
+            for (k, sum) in sums.iter_mut().enumerate() {
+                let (a, b) = (checked(a.0, a.1[k], n, 1), checked(b.0, b.1[k], n, 1));
+                for i in 0..n.div_ceil(8) {
+                    // SAFETY: inside the pictures, or their tails, by `checked`; feature as above.
+                    unsafe {
+                        let f = _mm256_loadu_si256(a.add(32 * i).cast());
+                        let e = _mm256_loadu_si256(b.add(32 * i).cast());
+                        *sum = _mm256_add_epi32(*sum, self.squares(f, e, i));
+                    }
+                }
+            }
+            // SAFETY: feature as above.
+            unsafe { Self::total(_mm256_sub_epi32(sums[0], sums[1])) }
         }
     }
 
