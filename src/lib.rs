@@ -30,8 +30,9 @@ pub use base::error::{Error, ErrorKind, Result};
 pub use image::mask::Mask;
 pub use image::material::MapKind;
 pub use image::picture::{Encoding, Picture, Samples};
-pub use image::sourcemap::SourceMap;
+pub use image::sourcemap::{Origin, SourceMap};
+pub use image::symmetry::Symmetry;
 pub use verb::inputs::Inputs;
 pub use verb::tile::{
-    Axis, Costs, Measure, Method, Quality, Report, Size, Tile, TileParams, tile, tiles,
+    Axis, Costs, Measure, Method, Quality, Report, Size, Symmetries, Tile, TileParams, tile, tiles,
 };

@@ -44,6 +44,7 @@ from texforge._types import (
     ProgressBar,
     Quality,
     SourceMap,
+    Symmetries,
     Tile,
     TileOptions,
 )
@@ -74,6 +75,7 @@ __all__ = [
     "ReadError",
     "SameFileError",
     "SourceMap",
+    "Symmetries",
     "TexforgeError",
     "Tile",
     "TileOptions",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias, TypedDict
 
@@ -27,6 +27,7 @@ __all__ = [
     "ProgressBar",
     "Quality",
     "SourceMap",
+    "Symmetries",
     "Tile",
     "TileOptions",
 ]
@@ -42,9 +43,17 @@ Measure: TypeAlias = Literal["histogram"] | Literal["none"]
 """The statistic that is made equal everywhere in a tile."""
 Quality: TypeAlias = Literal["draft"] | Literal["normal"] | Literal["best"]
 """How much time to spend."""
+Symmetries: TypeAlias = Literal["none"] | Literal["mirror"] | Literal["rotate"] | Literal["all"]
+"""In which symmetries the photo's patches are used."""
 Encoding: TypeAlias = Literal["srgb"] | Literal["linear"] | Literal["data"]
 """What the numbers of a picture mean."""
-MapKind: TypeAlias = Literal["color"] | Literal["data"] | Literal["normal"]
+MapKind: TypeAlias = (
+    Literal["color"]
+    | Literal["data"]
+    | Literal["normal"]
+    | Literal["normal_gl"]
+    | Literal["normal_dx"]
+)
 """What the numbers of a material's map mean."""
 PathType: TypeAlias = str | PathLike[str]
 """Where a file is."""
@@ -81,10 +90,12 @@ class TileOptions(TypedDict, total=False):
     quality: Quality
     avoid_grow: int
     flatten: float
+    symmetry: Symmetries
     seed: int
+    also: Sequence[ImageLike] | None
     mask: ImageLike | None
     avoid: ImageLike | None
-    maps: Mapping[str, ImageLike] | None
+    maps: Mapping[str, ImageLike | Sequence[ImageLike]] | None
     encoding: Encoding | Literal["auto"]
     threads: int | None
     progress: Progress
@@ -155,22 +166,32 @@ class SourceMap:
     positions : (H, W, 2) ndarray of int32
         Row and column of the photo's pixel that each pixel is a copy of.
     source_size : (int, int)
-        Height and width of the photo.
+        Height and width of the (first) photo.
+    further_sizes : tuple of (int, int)
+        Height and width of the photos after the first.
+    origins : (H, W, 2) ndarray of int32, or None
+        Which photo each pixel is of, from 0 on, and in which symmetry: quarter turns
+        counter-clockwise, and 4 more if the photo was mirrored left to right before. None if all
+        are of the only photo, as it lies.
     """
 
     positions: npt.NDArray[np.int32]
     source_size: tuple[int, int]
+    further_sizes: tuple[tuple[int, int], ...] = ()
+    origins: npt.NDArray[np.int32] | None = None
 
     def __array__(self, dtype: Any = None, *, copy: bool | None = None) -> npt.NDArray[Any]:
         """Return the positions."""
         array: npt.NDArray[Any] = np.asarray(self.positions, dtype=dtype)
         return array.copy() if copy and array is self.positions else array
 
-    def apply(self, image: ImageLike, *, kind: MapKind = "data") -> npt.NDArray[Any]:
+    def apply(
+        self, image: ImageLike, *, kind: MapKind = "data", also: Sequence[ImageLike] = ()
+    ) -> npt.NDArray[Any]:
         """Make another map of the photo's material match: see `texforge.apply`."""
         from texforge import _api
 
-        return _api.apply(self, image, kind=kind)
+        return _api.apply(self, image, kind=kind, also=also)
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -185,8 +206,8 @@ class Tile:
         The tile, with the data type and the number of channels of the photo.
     source_map : (H, W, 2) ndarray of int32, or None
         Row and column of the photo's pixel that each pixel is a copy of, so that
-        ``image == photo[source_map[..., 0], source_map[..., 1]]``. None for the method
-        ``"make-seamless"``, which blends.
+        ``image == photo[source_map[..., 0], source_map[..., 1]]`` (of one photo; see `origins`).
+        None for the method ``"make-seamless"``, which blends.
     costs : Costs
         How well it went.
     seed : int
@@ -201,7 +222,12 @@ class Tile:
     encoding : {"srgb", "linear", "data"}
         What the numbers of `image` mean.
     photo_size : (int, int)
-        Height and width of the photo.
+        Height and width of the (first) photo.
+    also_sizes : tuple of (int, int)
+        Height and width of the further photos.
+    origins : (H, W, 2) ndarray of int32, or None
+        Which photo each pixel is of and in which symmetry: see `SourceMap`. None if all are of
+        the only photo, as it lies.
     """
 
     image: npt.NDArray[Any]
@@ -213,8 +239,12 @@ class Tile:
     maps: dict[str, npt.NDArray[Any]]
     encoding: Encoding
     photo_size: tuple[int, int]
+    also_sizes: tuple[tuple[int, int], ...] = ()
+    origins: npt.NDArray[np.int32] | None = None
 
-    def apply(self, image: ImageLike, *, kind: MapKind = "data") -> npt.NDArray[Any]:
+    def apply(
+        self, image: ImageLike, *, kind: MapKind = "data", also: Sequence[ImageLike] = ()
+    ) -> npt.NDArray[Any]:
         """Make another map of the photo's material match the tile.
 
         Parameters
@@ -222,7 +252,9 @@ class Tile:
         image : array_like
             The map, showing the same as the photo; of any resolution with its aspect ratio.
         kind : {"data", "color", "normal"}
-            What its numbers are. Normals come out with unit length.
+            What its numbers are: see `texforge.apply`.
+        also : sequence of array_like
+            The same map of each further photo.
 
         Returns
         -------
@@ -238,7 +270,7 @@ class Tile:
         """
         from texforge import _api
 
-        return _api.apply(self, image, kind=kind)
+        return _api.apply(self, image, kind=kind, also=also)
 
     def save(self, path: PathType, *, overwrite: bool = False) -> None:
         """Write the tile to a file that also records how it was made.

@@ -6,8 +6,9 @@ use clap::builder::{PossibleValuesParser, RangedU64ValueParser, StringValueParse
 use clap::{Arg, ArgAction, ArgMatches, Command, ValueHint, value_parser};
 
 use crate::base::error::Result;
-use crate::base::params::Param;
+use crate::base::params::{Param, Value as _};
 use crate::cli::maps;
+use crate::image::material::MapKind;
 use crate::verb::tile::{MAX_VARIANTS, TileParams};
 
 const TILE_EXAMPLES: &str = "\
@@ -18,13 +19,15 @@ Examples:
   texforge tile scan.png -o wall.png --mask usable.png --map normal=scan_nrm.png
   texforge tile brick.jpg -o clean.png --avoid stains.png --avoid-grow 12
   texforge tile meadow.jpg -o meadow.png --flatten 0.2 --variants 4
+  texforge tile grass_a.jpg --also grass_b.jpg --symmetry all -o grass.png
   texforge tile brick.jpg -o - | display";
 
 const APPLY_EXAMPLES: &str = "\
 Examples:
   texforge tile brick.jpg -o brick.png --save-source-map brick_source.exr
   texforge apply brick_source.exr photo_normal.png -o brick_normal.png
-  texforge apply brick_source.exr photo_wetness.png -o brick_wetness.png --kind data";
+  texforge apply brick_source.exr photo_wetness.png -o brick_wetness.png --kind data
+  texforge apply grass_source.exr a_normal_gl.png --also b_normal_gl.png -o grass_normal_gl.png";
 
 /// The whole command line.
 pub(super) fn command() -> Command {
@@ -99,6 +102,12 @@ fn tile() -> Command {
         .args(TileParams::schema().into_iter().map(flag))
         .next_help_heading("Inputs")
         .arg(
+            file("also", "PHOTO", "A further photo to mix with the first, of the same sample type and channels and of \
+                 any size; may be repeated")
+                .long("also")
+                .action(ArgAction::Append),
+        )
+        .arg(
             file("mask", "FILE", "Picture of the photo's size: usable is where its first channel is at least half of \
                  full scale and its alpha, if any, too; the photo's own transparent pixels are never used")
                 .long("mask"),
@@ -116,7 +125,7 @@ fn tile() -> Command {
                 .value_parser(ValueParser::os_string())
                 .help(format!(
                     "A further map of the same surface that follows the tile pixel by pixel; may be \
-                     repeated. NAME is one of {}. Maps whose file name is the photo's with such an \
+                     repeated, and comes once for each photo, in their order. NAME is one of {}. Maps whose file name is the photo's with such an \
                      ending are taken by themselves",
                     maps::known_names()
                 )),
@@ -177,11 +186,19 @@ fn apply() -> Command {
                 .required(true),
         )
         .arg(
+            file("also", "MAP", "The same map of the next photo, for a tile made of several; may be repeated")
+                .long("also")
+                .action(ArgAction::Append),
+        )
+        .arg(
             Arg::new("kind")
                 .long("kind")
                 .value_name("KIND")
-                .value_parser(["color", "data", "normal"])
-                .help("What the map's numbers are; without it the file's name decides"),
+                .value_parser(PossibleValuesParser::new(MapKind::CHOICES))
+                .help(
+                    "What the map's numbers are; without it the file's name decides. Normals whose green points \
+                     up are normal_gl (OpenGL), down normal_dx (DirectX)",
+                ),
         )
         .arg(switch("force", "Overwrite an output that exists already"))
         .arg(json())

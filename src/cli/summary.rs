@@ -1,7 +1,7 @@
 //! What `texforge tile` says when it is done: to people, to programs, and in the file itself.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use serde::{Serialize, Serializer};
@@ -33,6 +33,9 @@ pub(super) struct Summary {
     threads: usize,
     params: BTreeMap<&'static str, serde_json::Value>,
     photo: Written,
+    /// The further photos.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    also: Vec<Written>,
     tile: Written,
     costs: Costs,
     seconds: Seconds,
@@ -111,7 +114,7 @@ fn params(report: &Report) -> BTreeMap<&'static str, serde_json::Value> {
 /// All of a run; `tiles` holds each tile's place and report.
 pub(super) fn summary(
     ctx: &Ctx,
-    photo: &Path,
+    photos: &[PathBuf],
     tiles: &[(Target, Report)],
     notes: Vec<String>,
     files: Vec<Written>,
@@ -129,7 +132,9 @@ pub(super) fn summary(
     if variants.len() == 1 {
         variants.clear();
     }
-    let (width, height) = report.photo_size;
+    let photo = |(path, &(width, height)): (&PathBuf, &(usize, usize))| {
+        Written::new("photo", None, path, width, height)
+    };
     Summary {
         schema_version: SCHEMA_VERSION,
         verb: TileParams::VERB,
@@ -137,7 +142,8 @@ pub(super) fn summary(
         seed: first.seed,
         threads: ctx.threads(),
         params: params(report),
-        photo: Written::new("photo", None, photo, width, height),
+        photo: photo((&photos[0], &report.photo_size)),
+        also: photos[1..].iter().zip(&report.also_sizes).map(photo).collect(),
         tile: first.tile,
         costs: first.costs,
         seconds: Seconds { stages: first.seconds, total: elapsed.as_secs_f64() },

@@ -22,7 +22,8 @@ use crate::verb::tile::{Method, Tile, TileParams, tiles};
 /// What was typed, checked as far as it can be without looking at a file.
 #[derive(Debug)]
 struct Request {
-    photo: PathBuf,
+    /// The photo and those mixed with it.
+    photos: Vec<PathBuf>,
     /// Where each tile goes.
     places: Vec<Place>,
     params: TileParams,
@@ -56,9 +57,10 @@ pub(super) fn run(matches: &ArgMatches) -> Result<()> {
     let request = Request::typed(matches)?;
     let seed = matches.get_one("seed").copied().unwrap_or_default();
     let threads = matches.get_one("threads").copied().unwrap_or_default();
+    // Before the first thread: whoever sees that one may send a signal.
+    watch_signals();
     let ctx = Ctx::new(seed, threads)?;
     let session = Session::new(ctx.job(), matches.get_flag("quiet"));
-    watch_signals();
     let (summary, lines) = supervise(&session, move |session| work(session, &ctx, &request))?;
     lines.iter().for_each(|line| session.console.say(line));
     if matches.get_flag("json") { print_json(&summary) } else { Ok(()) }
@@ -69,7 +71,10 @@ impl Request {
         let path = |id| matches.get_one::<PathBuf>(id).cloned();
         let params = args::tile_params(matches)?;
         let target = Target::typed(&path("output").unwrap_or_default())?;
-        let maps = maps::typed(matches.get_many::<OsString>("map").into_iter().flatten())?;
+        let mut photos = vec![path("photo").unwrap_or_default()];
+        photos.extend(matches.get_many::<PathBuf>("also").into_iter().flatten().cloned());
+        let maps = matches.get_many::<OsString>("map").into_iter().flatten();
+        let maps = maps::typed(maps, photos.len())?;
         let source_map = path("save-source-map");
         let wants = |flag| matches.get_flag(flag);
         let count = matches.get_one::<usize>("variants").copied().unwrap_or(1);
@@ -91,7 +96,7 @@ impl Request {
             return Err(Error::parameter("method", expected, "`make-seamless`, which blends"));
         }
         Ok(Self {
-            photo: path("photo").unwrap_or_default(),
+            photos,
             pick_up: !wants("no-maps")
                 && target != Target::Stdout
                 && params.method != Method::MakeSeamless,
@@ -105,21 +110,24 @@ impl Request {
     }
 
     fn inputs(&self) -> Vec<&Path> {
-        let maps = self.maps.iter().map(|m| m.path.as_path());
-        let masks = self.mask.as_deref().into_iter().chain(self.avoid.as_deref());
-        maps.chain([self.photo.as_path()]).chain(masks).collect()
+        let maps = self.maps.iter().flat_map(|m| &m.paths);
+        maps.chain(&self.photos)
+            .chain(&self.mask)
+            .chain(&self.avoid)
+            .map(PathBuf::as_path)
+            .collect()
     }
 
     /// Fails if an output cannot be written, or two outputs are the same file.
     fn check_outputs(&self, maps: &[Input]) -> Result<()> {
         let mut inputs = self.inputs();
-        inputs.extend(maps.iter().map(|m| m.wanted.path.as_path()));
+        inputs.extend(maps.iter().flat_map(|m| &m.wanted.paths).map(PathBuf::as_path));
         let mut seen: Vec<PathBuf> = Vec::new();
         for place in &self.places {
             let tile = place.tile.file().map(|p| ("output", p.to_owned()));
             let source_map = place.source_map.clone().map(|p| ("save-source-map", p));
             let preview = place.preview.clone().map(|p| ("preview", p));
-            let maps = maps.iter().map(|m| ("map", place.map(m.wanted.name, &m.picture)));
+            let maps = maps.iter().map(|m| ("map", place.map(m.wanted.name, &m.pictures[0])));
             for (flag, path) in tile.into_iter().chain(source_map).chain(preview).chain(maps) {
                 files::check_place(&path, &inputs, self.force)?;
                 let absolute = std::path::absolute(&path).map_err(Error::io("write", &path))?;
@@ -153,10 +161,10 @@ fn needs_file(flag: &'static str) -> Error {
     Error::parameter(flag, "left out when the tile goes to standard output", "`-o -`")
 }
 
-/// A map that was read.
+/// A map that was read, of each photo.
 struct Input {
     wanted: Wanted,
-    picture: Picture,
+    pictures: Vec<Picture>,
 }
 
 /// Everything between the checked command line and the renamed files.
@@ -165,9 +173,17 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Vec
     request.check_outputs(&[])?;
 
     // Read all inputs and let them prove that they fit together.
-    let photo = files::read(&request.photo, MapKind::Color)?;
+    let mut photo = files::read(&request.photos[0], MapKind::Color)?;
+    let mut also = Vec::new();
+    let mut notes = std::mem::take(&mut photo.meta.notes);
+    for path in &request.photos[1..] {
+        session.check()?;
+        let mut picture = files::read(path, MapKind::Color)?;
+        let shown = path.display();
+        notes.extend(picture.meta.notes.drain(..).map(|note| format!("{shown}: {note}")));
+        also.push(picture);
+    }
     session.check()?;
-    let mut notes: Vec<String> = photo.meta.notes.clone();
     let read_mask = |path: &Option<PathBuf>, what| {
         let Some(path) = path else { return Ok(None) };
         let mask = Mask::from_picture(&files::read(path, MapKind::Color)?)?;
@@ -176,13 +192,13 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Vec
     };
     let mask = read_mask(&request.mask, "the mask")?;
     let avoid = read_mask(&request.avoid, "the avoid mask")?;
-    let maps = read_maps(session, request, &photo, &mut notes)?;
+    let inputs = Inputs { photo: &photo, also: &also, mask: mask.as_ref(), avoid: avoid.as_ref() };
+    let maps = read_maps(session, request, &inputs, &mut notes)?;
     request.check_outputs(&maps)?;
     files::ensure_can_hold(&photo, request.places[0].tile.file(), MapKind::Color)?;
     session.check()?;
 
     // The long work.
-    let inputs = Inputs { photo: &photo, mask: mask.as_ref(), avoid: avoid.as_ref() };
     let made = tiles(ctx, &inputs, &request.params, request.places.len())?;
     notes.extend(made[0].report.notes.iter().cloned());
 
@@ -207,8 +223,9 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Vec
             None => piped = Some(bytes),
         }
         if let Some(source_map) = &source_map {
-            for Input { wanted, picture: map } in &maps {
-                let map = source_map.apply(map, wanted.kind)?;
+            for Input { wanted, pictures } in &maps {
+                let maps: Vec<&Picture> = pictures.iter().collect();
+                let map = source_map.apply_all(&maps, wanted.kind)?;
                 let to = place.map(wanted.name, &map);
                 let bytes = files::encode(&map, Some(&to), wanted.kind, None)?;
                 stage("map", Some(wanted.name), &to, bytes, &map)?;
@@ -241,42 +258,43 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Vec
     let elapsed = session.console.elapsed();
     let line = |(target, report): &_| summary::line(request.params.size, target, report, elapsed);
     let lines = done.iter().map(line).collect();
-    Ok((summary::summary(ctx, &request.photo, &done, notes, written, elapsed), lines))
+    Ok((summary::summary(ctx, &request.photos, &done, notes, written, elapsed), lines))
 }
 
-/// Reads the maps that were typed and those that lie beside the photo. Of the latter, those that
+/// Reads the maps that were typed and those that lie beside the photos. Of the latter, those that
 /// do not fit are left out with a note: nobody asked for them.
 fn read_maps(
     session: &Session,
     request: &Request,
-    photo: &Picture,
+    inputs: &Inputs<'_>,
     notes: &mut Vec<String>,
 ) -> Result<Vec<Input>> {
     let mut wanted = request.maps.clone();
     if request.pick_up {
-        let taken: Vec<_> = request.inputs().into_iter().map(Path::to_owned).collect();
-        for Sibling { name, kind, path } in files::siblings(&request.photo)? {
-            let taken = taken.iter().any(|taken| same_place(taken, &path));
-            if !taken && !wanted.iter().any(|m| m.name == name) {
-                // Shown as the photo was typed.
-                let path = path.strip_prefix(".").map_or(path.clone(), Path::to_owned);
-                wanted.push(Wanted { name, path, kind, found: true });
-            }
-        }
+        wanted.extend(beside(request, notes)?);
     }
     let mut maps = Vec::new();
     for wanted in wanted {
-        session.check()?;
-        let read = files::read(&wanted.path, wanted.kind).and_then(|map| {
-            map.ensure_finite(&format!("the map `{}`", wanted.name))?;
-            maps::ensure_fits(&map, photo, &wanted)?;
-            Ok(map)
-        });
-        let shown = wanted.path.display().to_string();
-        match read {
-            Ok(picture) => {
-                let own =
-                    |place: &Place| same_place(&place.map(wanted.name, &picture), &wanted.path);
+        let read = || {
+            let mut pictures = Vec::new();
+            for path in &wanted.paths {
+                session.check()?;
+                let map = files::read(path, wanted.kind)?;
+                map.ensure_finite(&format!("the map `{}`", wanted.name))?;
+                pictures.push(map);
+            }
+            let all: Vec<&Picture> = pictures.iter().collect();
+            let name = format!("{} ({})", wanted.name, wanted.paths[0].display());
+            inputs.ensure_maps_fit(&name, &all, wanted.kind, &request.params)?;
+            Ok(pictures)
+        };
+        let shown = wanted.paths[0].display().to_string();
+        match read() {
+            Ok(pictures) => {
+                let own = |place: &Place| {
+                    let to = place.map(wanted.name, &pictures[0]);
+                    wanted.paths.iter().any(|path| same_place(&to, path))
+                };
                 if wanted.found && request.places.iter().any(own) {
                     // What an earlier run made of a map is no map of the photo.
                     notes.push(format!("{shown} was left alone: it is where this tile's map goes"));
@@ -288,13 +306,43 @@ fn read_maps(
                         "{shown}: taken as the photo's {name} map (--no-maps leaves it alone)"
                     ));
                 }
-                maps.push(Input { wanted, picture });
+                maps.push(Input { wanted, pictures });
             }
+            Err(error @ Error::Cancelled) => return Err(error),
             Err(error) if wanted.found => notes.push(format!("{shown} was left alone: {error}")),
             Err(error) => return Err(error),
         }
     }
     Ok(maps)
+}
+
+/// The maps that lie beside the photos and were not typed: those that every photo has.
+fn beside(request: &Request, notes: &mut Vec<String>) -> Result<Vec<Wanted>> {
+    let taken: Vec<_> = request.inputs().into_iter().map(Path::to_owned).collect();
+    let mut found: Vec<Vec<Sibling>> = Vec::new();
+    for photo in &request.photos {
+        let mut siblings = files::siblings(photo)?;
+        siblings.retain(|s| {
+            let typed = request.maps.iter().any(|m| m.name == s.name);
+            !typed && !taken.iter().any(|taken| same_place(taken, &s.path))
+        });
+        found.push(siblings);
+    }
+    // Shown as the photo was typed.
+    let shown = |path: &Path| path.strip_prefix(".").unwrap_or(path).to_owned();
+    let mut wanted = Vec::new();
+    for Sibling { name, kind, path } in &found[0] {
+        let of_photo =
+            |all: &Vec<Sibling>| all.iter().find(|s| s.name == *name).map(|s| shown(&s.path));
+        match found.iter().map(of_photo).collect() {
+            Some(paths) => wanted.push(Wanted { name, paths, kind: *kind, found: true }),
+            None => notes.push(format!(
+                "{} was left alone: not every photo has a {name} map",
+                shown(path).display()
+            )),
+        }
+    }
+    Ok(wanted)
 }
 
 /// Whether two paths name the same file, as far as both exist.

@@ -4,6 +4,7 @@ pub mod color;
 pub mod io;
 pub mod mask;
 pub mod material;
+pub mod normals;
 pub mod picture;
 pub mod sourcemap;
 pub mod symmetry;

@@ -17,38 +17,22 @@ use pyo3::types::{PyBytes, PyDict};
 
 use crate::base::ctx::Ctx;
 use crate::base::error::{Error, ErrorKind, Result};
+use crate::base::params::Value as _;
 use crate::image::io::{self, Format, WriteOptions};
 use crate::image::mask::Mask;
 use crate::image::material::{self, MapKind};
 use crate::image::picture::Picture;
-use crate::image::sourcemap::SourceMap;
 use crate::verb::inputs::Inputs;
 use crate::verb::tile::{Tile, TileParams};
 use array::{ArrayIn, ArrayOut, MapIn, MapOut, array_out, map_out};
 use error::IntoPy;
 
-/// A picture of another map of the material: name, picture, what its numbers are.
-type NamedMap<'py> = (String, ArrayIn<'py>, String);
+/// Another map of the material: name, a picture of each photo's, what its numbers are.
+type NamedMap<'py> = (String, Vec<ArrayIn<'py>>, String);
 
 fn kind_named(name: &str) -> Result<MapKind> {
-    match name {
-        "color" => Ok(MapKind::Color),
-        "data" => Ok(MapKind::Data),
-        "normal" => Ok(MapKind::Normal),
-        _ => Err(Error::parameter("kind", "one of color, data, normal", format!("`{name}`"))),
-    }
-}
-
-/// Fails before the long work if `map` could not be gathered after it.
-fn ensure_same_shape(name: &str, map: &Picture, photo: &Picture) -> Result<()> {
-    let probe = SourceMap::new((1, 1), (photo.height(), photo.width()), vec![[0, 0]])?;
-    match probe.apply(map, MapKind::Data) {
-        Err(Error::SizeMismatch { got_w, got_h, want_w, want_h, remedy, .. }) => {
-            let what = format!("the map `{name}`");
-            Err(Error::SizeMismatch { what, got_w, got_h, want_w, want_h, remedy })
-        }
-        other => other.map(drop),
-    }
+    MapKind::parse(name)
+        .ok_or_else(|| Error::parameter("kind", MapKind::expected(), format!("`{name}`")))
 }
 
 /// A tile for Python: the picture, the source map, the gathered maps and the report as JSON.
@@ -60,10 +44,11 @@ type TileOut<'py> = (ArrayOut<'py>, Option<MapOut<'py>>, Vec<(String, ArrayOut<'
     clippy::too_many_arguments,
     reason = "one private caller, in _api.py, passes them by name"
 )]
-#[pyo3(signature = (*, photo, mask, avoid, maps, params, seed, count, threads, progress))]
+#[pyo3(signature = (*, photo, also, mask, avoid, maps, params, seed, count, threads, progress))]
 fn tiles<'py>(
     py: Python<'py>,
     photo: ArrayIn<'py>,
+    also: Vec<ArrayIn<'py>>,
     mask: Option<ArrayIn<'py>>,
     avoid: Option<ArrayIn<'py>>,
     maps: Vec<NamedMap<'py>>,
@@ -78,26 +63,33 @@ fn tiles<'py>(
         settings.set(name, text).into_py(py)?;
     }
     settings.validate().into_py(py)?;
-    let photo = photo.picture(py)?;
+    let pictures = |all: &[ArrayIn<'py>]| {
+        all.iter().map(|picture| picture.picture(py)).collect::<PyResult<Vec<_>>>()
+    };
+    let (photo, also) = (photo.picture(py)?, pictures(&also)?);
     let read_mask = |mask: Option<ArrayIn<'py>>| {
         let mask = mask.map(|mask| mask.picture(py)).transpose()?;
         mask.map(|mask| Mask::from_picture(&mask)).transpose().into_py(py)
     };
     let (mask, avoid) = (read_mask(mask)?, read_mask(avoid)?);
     let mut others = Vec::with_capacity(maps.len());
-    for (name, map, kind) in &maps {
-        let map = map.picture(py)?;
-        ensure_same_shape(name, &map, &photo).into_py(py)?;
-        others.push((name.clone(), map, kind_named(kind).into_py(py)?));
+    for (name, maps, kind) in &maps {
+        let (maps, kind) = (pictures(maps)?, kind_named(kind).into_py(py)?);
+        Inputs { also: &also, ..Inputs::new(&photo) }
+            .ensure_maps_fit(name, &maps.iter().collect::<Vec<_>>(), kind, &settings)
+            .into_py(py)?;
+        others.push((name.clone(), maps, kind));
     }
     let ctx = Ctx::new(seed, threads).into_py(py)?;
     let job = ctx.job();
     let made = enter::enter(py, &job, progress.as_ref(), move || {
-        let inputs = Inputs { photo: &photo, mask: mask.as_ref(), avoid: avoid.as_ref() };
+        let inputs =
+            Inputs { photo: &photo, also: &also, mask: mask.as_ref(), avoid: avoid.as_ref() };
         let gather = |tile: Tile| {
             let gathered = tile.source_map.iter().flat_map(|source_map| {
-                let gather = |(name, map, kind): &(String, Picture, MapKind)| {
-                    Ok((name.clone(), source_map.apply(map, *kind)?))
+                let gather = |(name, maps, kind): &(String, Vec<Picture>, MapKind)| {
+                    let maps: Vec<&Picture> = maps.iter().collect();
+                    Ok((name.clone(), source_map.apply_all(&maps, *kind)?))
                 };
                 others.iter().map(gather)
             });
@@ -121,19 +113,20 @@ fn tiles<'py>(
     made.into_iter().map(out).collect()
 }
 
-/// Gathers a map through a source map.
+/// Gathers a map, one picture of each photo, through a source map.
 #[pyfunction]
-#[pyo3(signature = (*, source_map, picture, kind))]
+#[pyo3(signature = (*, source_map, pictures, kind))]
 fn apply<'py>(
     py: Python<'py>,
     source_map: MapIn<'py>,
-    picture: ArrayIn<'py>,
+    pictures: Vec<ArrayIn<'py>>,
     kind: &str,
 ) -> PyResult<ArrayOut<'py>> {
     let kind = kind_named(kind).into_py(py)?;
     let source_map = source_map.source_map(py)?;
-    let picture = picture.picture(py)?;
-    let out = enter::unheard(py, move || source_map.apply(&picture, kind))?;
+    let maps = pictures.iter().map(|map| map.picture(py)).collect::<PyResult<Vec<_>>>()?;
+    let out =
+        enter::unheard(py, move || source_map.apply_all(&maps.iter().collect::<Vec<_>>(), kind))?;
     array_out(py, &out)
 }
 
@@ -195,12 +188,8 @@ fn write_source_map<'py>(
 
 /// What the numbers of a material's map of this name are.
 #[pyfunction]
-fn map_kind(name: &str) -> &'static str {
-    match material::classify(name) {
-        Some((_, MapKind::Color)) => "color",
-        Some((_, MapKind::Normal)) => "normal",
-        Some((_, MapKind::Data)) | None => "data",
-    }
+fn map_kind(name: &str) -> String {
+    material::classify(name).map_or(MapKind::Data, |(_, kind)| kind).show()
 }
 
 /// Every parameter of `tile`, with its default as text.

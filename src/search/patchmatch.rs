@@ -117,6 +117,25 @@ impl Usage {
         self
     }
 
+    /// The same with a further cost for every patch of each picture of the source's atlas.
+    #[must_use]
+    pub fn with_picture_costs(mut self, source: &Source, costs: &[i32]) -> Self {
+        let cells = |from: usize, len: usize| {
+            // The cells that begin in the view; one that reaches over its end is hardly used.
+            let cell = 1 << self.shift;
+            from.div_ceil(cell)..(from + len).div_ceil(cell)
+        };
+        let rows = self.cost.len() / self.cols;
+        for view in source.atlas.views() {
+            for y in cells(view.corner.0, view.size.0).filter(|&y| y < rows) {
+                for x in cells(view.corner.1, view.size.1).filter(|&x| x < self.cols) {
+                    self.cost[y * self.cols + x] += costs[view.picture];
+                }
+            }
+        }
+        self
+    }
+
     #[inline]
     fn cost(&self, pos: Pos) -> i32 {
         self.cost[(pos.y() >> self.shift) * self.cols + (pos.x() >> self.shift)]

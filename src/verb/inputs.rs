@@ -2,7 +2,9 @@
 
 use crate::base::error::{Error, Result};
 use crate::image::mask::Mask;
+use crate::image::material::MapKind;
 use crate::image::picture::Picture;
+use crate::image::sourcemap::{Origin, SourceMap};
 use crate::method::flatten::{self, Flat};
 use crate::verb::tile::TileParams;
 
@@ -12,9 +14,12 @@ pub struct Inputs<'a> {
     /// The photo, H x W x C: grey, RGB (each with or without alpha), or data of any number of
     /// channels.
     pub photo: &'a Picture,
-    /// Where it may be used (size of the photo).
+    /// Further photos of the same sample type, channels and encoding, of any sizes, to mix with it.
+    /// Of these, all that is opaque may be used.
+    pub also: &'a [Picture],
+    /// Where the photo may be used (size of the photo).
     pub mask: Option<&'a Mask>,
-    /// What must not be copied from it (size of the photo): marks, which
+    /// What must not be copied from the photo (size of the photo): marks, which
     /// [`TileParams::avoid_grow`] widens.
     pub avoid: Option<&'a Mask>,
 }
@@ -22,12 +27,20 @@ pub struct Inputs<'a> {
 impl<'a> Inputs<'a> {
     /// A photo alone.
     pub fn new(photo: &'a Picture) -> Self {
-        Self { photo, mask: None, avoid: None }
+        Self { photo, also: &[], mask: None, avoid: None }
     }
 
-    /// Where the photo may be used: the caller's masks and the photo's own alpha; `None` is
+    /// All photos, in their order: as they are, or `flat` in their place.
+    pub(super) fn photos<'b>(&'b self, flat: Option<&'b [Picture]>) -> Vec<&'b Picture> {
+        match flat {
+            Some(flat) => flat.iter().collect(),
+            None => [self.photo].into_iter().chain(self.also).collect(),
+        }
+    }
+
+    /// Where each photo may be used: the caller's masks and the photo's own alpha; `None` is
     /// everywhere.
-    pub(super) fn usable(&self, params: &TileParams) -> Result<Option<Mask>> {
+    pub(super) fn usable(&self, params: &TileParams) -> Result<Vec<Option<Mask>>> {
         let (height, width) = (self.photo.height(), self.photo.width());
         let mut parts = Vec::new();
         if let Some(mask) = self.mask {
@@ -42,27 +55,65 @@ impl<'a> Inputs<'a> {
             return Err(Error::parameter("avoid_grow", expected, params.avoid_grow));
         }
         parts.extend(Mask::from_alpha(self.photo));
-        let all = parts.into_iter().map(Ok).reduce(|a, b| a?.and(&b?)).transpose()?;
-        Ok(all.filter(|m| m.count() < m.usable().len()))
+        let first = parts.into_iter().map(Ok).reduce(|a, b| a?.and(&b?)).transpose()?;
+        let all = [first].into_iter().chain(self.also.iter().map(Mask::from_alpha));
+        Ok(all.map(|mask| mask.filter(|m| m.count() < m.usable().len())).collect())
     }
-    /// The photo with its light flattened, if `params` want it; `notes` say what was done.
+
+    /// The photos with their light flattened, if `params` want it; `notes` say what was done.
     pub(super) fn flattened(
         &self,
-        mask: Option<&Mask>,
+        masks: &[Option<Mask>],
         params: &TileParams,
         notes: &mut Vec<String>,
-    ) -> Result<Option<Picture>> {
+    ) -> Result<Option<Vec<Picture>>> {
         if params.flatten <= 0.0 {
             return Ok(None);
         }
-        let sigma = f64::from(params.flatten) * self.photo.height().min(self.photo.width()) as f64;
-        let Flat { picture, factors: (low, high), clipped } =
-            flatten::run(self.photo, mask, sigma)?;
-        notes.push(format!(
-            "light flattened over {sigma:.0} pixels: multiplied by {low:.2} to {high:.2}, {:.1} % of \
-             the samples cut off at full scale",
-            clipped * 100.0
-        ));
-        Ok(Some(picture))
+        let flat = |(photo, mask): (&Picture, &Option<Mask>)| {
+            let sigma = f64::from(params.flatten) * photo.height().min(photo.width()) as f64;
+            let Flat { picture, factors: (low, high), clipped } =
+                flatten::run(photo, mask.as_ref(), sigma)?;
+            notes.push(format!(
+                "light flattened over {sigma:.0} pixels: multiplied by {low:.2} to {high:.2}, {:.1} % \
+                 of the samples cut off at full scale",
+                clipped * 100.0
+            ));
+            Ok(picture)
+        };
+        self.photos(None).into_iter().zip(masks).map(flat).collect::<Result<Vec<_>>>().map(Some)
     }
+
+    /// Fails before the long work if `maps`, called `name`, could not be gathered after it: not one a
+    /// photo, of another shape or type, or normals that would have to be turned and do not say how.
+    ///
+    /// # Errors
+    /// Those of [`SourceMap::apply_all`](crate::SourceMap::apply_all).
+    pub fn ensure_maps_fit(
+        &self,
+        name: &str,
+        maps: &[&Picture],
+        kind: MapKind,
+        params: &TileParams,
+    ) -> Result<()> {
+        let sizes = self.photos(None).iter().map(|p| (p.height(), p.width())).collect();
+        kind.ensure_turnable(params.symmetry.list().iter().any(|s| s.swaps_axes()))?;
+        // One pixel is gathered: the rules are those of the source map.
+        let probe = SourceMap::of_views((1, 1), sizes, vec![[0, 0]], vec![Origin::default()])?;
+        probe.apply_all(maps, kind).map(drop).map_err(|error| match error {
+            Error::SizeMismatch { what, got_w, got_h, want_w, want_h, remedy } => {
+                let what = named(&what, name);
+                Error::SizeMismatch { what, got_w, got_h, want_w, want_h, remedy }
+            }
+            Error::BadPicture { what, reason } => {
+                Error::BadPicture { what: named(&what, name), reason }
+            }
+            other => other,
+        })
+    }
+}
+
+/// "the map" and "map 2" with the map's name.
+fn named(what: &str, name: &str) -> String {
+    format!("{what} `{name}`")
 }

@@ -14,6 +14,7 @@ use crate::image::mask::Mask;
 use crate::image::material::MapKind;
 use crate::image::picture::Picture;
 use crate::image::sourcemap::SourceMap;
+use crate::image::symmetry::Symmetry;
 use crate::method::make_seamless;
 use crate::method::stationary::{self, Exemplar};
 use crate::search::patchmatch::Wrap;
@@ -116,6 +117,33 @@ choice! {
     }
 }
 
+choice! {
+    /// In which symmetries the photo's patches are used.
+    pub enum Symmetries {
+        /// As they lie.
+        None = "none",
+        /// Mirrored left to right as well.
+        Mirror = "mirror",
+        /// In all four quarter turns.
+        Rotate = "rotate",
+        /// Mirrored and turned: all eight.
+        All = "all",
+    }
+}
+
+impl Symmetries {
+    /// All that are in it; the first is the photo as it lies.
+    pub fn list(self) -> &'static [Symmetry] {
+        const MIRROR: [Symmetry; 2] = [Symmetry::ALL[0], Symmetry::ALL[4]];
+        match self {
+            Self::None => &Symmetry::ALL[..1],
+            Self::Mirror => &MIRROR,
+            Self::Rotate => &Symmetry::ALL[..4],
+            Self::All => &Symmetry::ALL,
+        }
+    }
+}
+
 params! {
     /// Parameters of [`tile`].
     pub struct TileParams for "tile" {
@@ -139,6 +167,8 @@ params! {
         avoid_grow: usize = 0, in 0..=10000, unit "px";
         /// Reach of the light flattening, 0.02 or more: differences of light that are wider are taken out of the photo first; 0 switches it off.
         flatten: f32 = 0.0, in 0.0..=1.0, unit "fraction of the photo's shorter side";
+        /// Whether patches are also used mirrored left to right, turned by quarters, or both: more to choose from, but light then falls from several sides.
+        symmetry: Symmetries = Symmetries::None;
     }
 }
 
@@ -166,6 +196,9 @@ pub struct Report {
     pub params: Vec<(&'static str, String)>,
     /// Width and height of the photo in pixels.
     pub photo_size: (usize, usize),
+    /// Width and height of the further photos.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub also_sizes: Vec<(usize, usize)>,
     /// Width and height of the tile in pixels.
     pub tile_size: (usize, usize),
     /// The costs.
@@ -182,7 +215,7 @@ pub struct Report {
 pub struct Tile {
     /// The tile, in the photo's own sample type; of the flattened photo's pixels if it was flattened.
     pub picture: Picture,
-    /// Which photo pixel each pixel of the tile is a copy of; `None` for
+    /// Which pixel of which photo each pixel of the tile is a copy of; `None` for
     /// [`Method::MakeSeamless`], which blends.
     pub source_map: Option<SourceMap>,
     /// How it was made and what it costs.
@@ -243,28 +276,30 @@ pub fn tiles(
     count: usize,
 ) -> Result<Vec<Tile>> {
     let start = Instant::now();
-    let (width, height) = check(inputs.photo, params, count)?;
+    let (width, height) = check(inputs, params, count)?;
     let last = ctx.seed.checked_add(count as u64 - 1);
     if last.is_none() {
         let expected = format!("at most {} with {count} variants", u64::MAX - (count as u64 - 1));
         return Err(Error::parameter("seed", expected, ctx.seed));
     }
     let wrap = Wrap { y: params.axis != Axis::X, x: params.axis != Axis::Y };
-    let mask = inputs.usable(params)?;
+    let masks = inputs.usable(params)?;
     let mut notes = Vec::new();
-    if mask.is_some() && params.method == Method::MakeSeamless {
+    if masks[0].is_some() && params.method == Method::MakeSeamless {
         notes.push("the method make-seamless uses the whole photo; the mask is ignored".to_owned());
     }
     let plan = plan(params, (height, width), wrap);
     let (flat, exemplar) = ctx.install(|| {
-        let flat = inputs.flattened(mask.as_ref(), params, &mut notes)?;
-        let photo = flat.as_ref().unwrap_or(inputs.photo);
-        let copies = params.method != Method::MakeSeamless;
-        let exemplar =
-            copies.then(|| Exemplar::new(ctx, photo, mask.as_ref(), &plan)).transpose()?;
-        Ok((flat, exemplar))
+        let flat = inputs.flattened(&masks, params, &mut notes)?;
+        if params.method == Method::MakeSeamless {
+            return Ok((flat, None));
+        }
+        let photos = inputs.photos(flat.as_deref());
+        let photos: Vec<_> = photos.into_iter().zip(masks.iter().map(Option::as_ref)).collect();
+        let exemplar = Exemplar::new(ctx, &photos, params.symmetry.list(), &plan)?;
+        Ok((flat, Some(exemplar)))
     })?;
-    let photo = flat.as_ref().unwrap_or(inputs.photo);
+    let photos = inputs.photos(flat.as_deref());
     let analysed = start.elapsed();
     ctx.begin(exemplar.as_ref().map_or(0, |e| e.work(&plan) * count as u64));
     let mut resolved = params.clone();
@@ -273,20 +308,21 @@ pub fn tiles(
         let start = Instant::now();
         let ctx = ctx.with_seed(seed);
         let (picture, source_map) = ctx.install(|| match &exemplar {
-            None => Ok((make_seamless::run(photo, (height, width), wrap)?, None)),
+            None => Ok((make_seamless::run(photos[0], (height, width), wrap)?, None)),
             Some(exemplar) => {
                 let map = stationary::run(&ctx, exemplar, &plan)?;
-                Ok((map.apply(photo, MapKind::Color)?, Some(map)))
+                Ok((map.apply_all(&photos, MapKind::Color)?, Some(map)))
             }
         })?;
         let made = start.elapsed();
         let costs =
-            ctx.install(|| Ok(costs(photo, &picture, source_map.as_ref(), params, wrap)))?;
+            ctx.install(|| Ok(costs(&photos, &picture, source_map.as_ref(), params, wrap)))?;
         let report = Report {
             version: env!("CARGO_PKG_VERSION"),
             seed,
             params: resolved.show(),
-            photo_size: (photo.width(), photo.height()),
+            photo_size: (photos[0].width(), photos[0].height()),
+            also_sizes: photos[1..].iter().map(|p| (p.width(), p.height())).collect(),
             tile_size: (width, height),
             costs,
             seconds: vec![
@@ -302,7 +338,7 @@ pub fn tiles(
 }
 
 /// Checks everything that can be known before the work; returns the tile's width and height.
-fn check(photo: &Picture, params: &TileParams, count: usize) -> Result<(usize, usize)> {
+fn check(inputs: &Inputs<'_>, params: &TileParams, count: usize) -> Result<(usize, usize)> {
     params.validate()?;
     if !(1..=MAX_VARIANTS).contains(&count) {
         return Err(Error::parameter("variants", format!("1 to {MAX_VARIANTS}"), count));
@@ -318,6 +354,7 @@ fn check(photo: &Picture, params: &TileParams, count: usize) -> Result<(usize, u
     if params.patch.is_multiple_of(2) {
         return Err(Error::parameter("patch", "odd, so that a patch has a middle", params.patch));
     }
+    let photo = inputs.photo;
     let (width, height) = params.resolved_size(photo.width(), photo.height());
     let sides = 1..=MAX_TILE_SIDE;
     if !sides.contains(&width) || !sides.contains(&height) {
@@ -337,8 +374,6 @@ fn check(photo: &Picture, params: &TileParams, count: usize) -> Result<(usize, u
             let expected = format!("at most the photo's {pw}x{ph} with the method make-seamless");
             return Err(Error::parameter("size", expected, format!("{width}x{height}")));
         }
-    } else if pw.min(ph) < params.patch {
-        return Err(too_small("the photo", pw, ph, "choose a smaller patch or a larger photo"));
     } else if width.min(height) < params.patch {
         return Err(too_small(
             "the tile",
@@ -347,16 +382,40 @@ fn check(photo: &Picture, params: &TileParams, count: usize) -> Result<(usize, u
             "choose a smaller patch or a larger size",
         ));
     }
-    photo.ensure_finite("the photo")?;
-    // Every tile with its source map stays until the last is made; the flattened photo is a copy.
+    let photos = inputs.photos(None);
+    for (i, photo) in photos.iter().enumerate() {
+        let what = if i == 0 { "the photo".to_owned() } else { format!("photo {}", i + 1) };
+        let (pw, ph) = (photo.width(), photo.height());
+        if params.method != Method::MakeSeamless && pw.min(ph) < params.patch {
+            return Err(too_small(&what, pw, ph, "choose a smaller patch or a larger photo"));
+        }
+        photo.ensure_like(photos[0], &what)?;
+        photo.ensure_finite(&what)?;
+    }
+    if params.method == Method::MakeSeamless {
+        let expected = "left out with the method make-seamless, which uses one photo as it lies";
+        if photos.len() > 1 {
+            return Err(Error::parameter("also", expected, photos.len() - 1));
+        }
+        if params.symmetry != Symmetries::None {
+            return Err(Error::parameter("symmetry", expected, params.symmetry.show()));
+        }
+    }
+    // Every tile with its source map stays until the last is made; flattened photos are copies.
     let tile = (width * height) as u64 * (photo.byte_len() / (pw * ph)) as u64;
-    let others = (tile + 8 * (width * height) as u64).checked_mul(count as u64 - 1);
-    let flat = if params.flatten > 0.0 { photo.byte_len() as u64 } else { 0 };
-    let need = others.and_then(|others| {
-        stationary::memory_bytes((ph, pw), (height, width)).checked_add(tile + flat + others)
-    });
+    let others = (tile + 12 * (width * height) as u64).checked_mul(count as u64 - 1);
+    let bytes: u64 = photos.iter().map(|photo| photo.byte_len() as u64).sum();
+    let flat = if params.flatten > 0.0 { bytes } else { 0 };
+    let sizes: Vec<_> = photos.iter().map(|photo| (photo.height(), photo.width())).collect();
+    let symmetries = params.symmetry.list();
+    let work = stationary::memory_bytes(&sizes, symmetries, (height, width));
+    let need = others.zip(work).and_then(|(others, work)| work.checked_add(tile + flat + others));
     let what = if count > 1 { format!("{count} tiles of") } else { "a tile of".to_owned() };
-    ensure_available(&format!("{what} {width}x{height} from a {pw}x{ph} photo"), need)?;
+    let from = match photos.len() * symmetries.len() {
+        1 => format!("a {pw}x{ph} photo"),
+        views => format!("{views} views of photos of {pw}x{ph} and so on"),
+    };
+    ensure_available(&format!("{what} {width}x{height} from {from}"), need)?;
     Ok((width, height))
 }
 
@@ -380,20 +439,20 @@ fn plan(params: &TileParams, size: (usize, usize), wrap: Wrap) -> stationary::Pl
 }
 
 fn costs(
-    photo: &Picture,
+    photos: &[&Picture],
     picture: &Picture,
     map: Option<&SourceMap>,
     params: &TileParams,
     wrap: Wrap,
 ) -> Costs {
-    let model = ColorModel::new(photo);
+    let model = ColorModel::new(photos[0]);
     let mut pixels = model.averaging_pixels(picture);
     model.space().convert_row(&mut pixels);
     let (height, width) = (picture.height(), picture.width());
     let domain = Domain { height, width, wrap_y: wrap.y, wrap_x: wrap.x };
     let sigma = f64::from(params.sigma) * height.min(width) as f64;
     Costs {
-        texture: map.map(|map| texture::cost_bound(picture, photo, map, params.patch, wrap)),
+        texture: map.map(|map| texture::cost_bound(picture, photos, map, params.patch, wrap)),
         stationarity: stationarity::histogram_cost(&pixels, domain, sigma),
     }
 }

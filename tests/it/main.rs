@@ -10,3 +10,4 @@ mod search;
 #[path = "../support/mod.rs"]
 mod support;
 mod tile;
+mod views;

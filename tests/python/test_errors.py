@@ -89,6 +89,7 @@ PARAMETERS: dict[str, dict[str, Any]] = {
     "flatten": {"flatten": 1.5},
     "flatten too little": {"flatten": 0.001},
     "flatten of data": {"flatten": 0.2, "encoding": "data"},
+    "symmetry": {"symmetry": "some"},
     "seed negative": {"seed": -1},
     "seed too large": {"seed": 2**64},
     "seed bool": {"seed": True},

@@ -3,6 +3,7 @@
 //! Moritz, James, Haines, Ritschel, Weyrich: Texture Stationarization (2017), Algorithm 1. The
 //! same loop without wrap or without projection gives the baselines.
 
+mod balance;
 mod level;
 
 use rayon::prelude::*;
@@ -11,7 +12,9 @@ use crate::base::ctx::Ctx;
 use crate::base::error::Result;
 use crate::image::mask::Mask;
 use crate::image::picture::Picture;
-use crate::image::sourcemap::SourceMap;
+use crate::image::sourcemap::{Origin, SourceMap};
+use crate::image::symmetry::Symmetry;
+use crate::search::atlas::Atlas;
 use crate::search::field::{Field, Pos};
 use crate::search::patch::MatchImage;
 use crate::search::patchmatch::{self, Search, Usage, Wrap};
@@ -20,6 +23,7 @@ use crate::search::vote::{Votes, vote};
 use crate::signal::histogram::{Distribution, SOFT_BITS};
 use crate::signal::localhist::{self, Domain};
 
+use balance::Balance;
 use level::Level;
 
 /// Channel that holds local contrast; the three before it are the colour.
@@ -58,23 +62,32 @@ pub struct Plan {
     pub fine_iterations: u32,
 }
 
-/// A photo, analysed: what all runs on it share.
+/// Photos, analysed: what all runs on them share.
 #[derive(Debug)]
-pub struct Exemplar<'a> {
-    photo: (usize, usize),
-    mask: Option<&'a Mask>,
+pub struct Exemplar {
+    /// Height and width of each photo.
+    sizes: Vec<(usize, usize)>,
     /// Finest first.
     levels: Vec<Level>,
+    /// Where the finest level's source may be used; `None` is everywhere.
+    usable: Option<Vec<bool>>,
 }
 
-impl<'a> Exemplar<'a> {
-    /// Analyses `photo`, as far as `mask` lets it be used, for tiles of this plan.
+impl Exemplar {
+    /// Analyses photos of one type, as far as their masks let them be used, in these symmetries, for
+    /// tiles of this plan.
     ///
     /// # Errors
     /// See [`tile`](crate::tile).
-    pub fn new(ctx: &Ctx, photo: &Picture, mask: Option<&'a Mask>, plan: &Plan) -> Result<Self> {
-        let levels = level::build(ctx, photo, mask, plan)?;
-        Ok(Self { photo: (photo.height(), photo.width()), mask, levels })
+    pub fn new(
+        ctx: &Ctx,
+        photos: &[(&Picture, Option<&Mask>)],
+        symmetries: &[Symmetry],
+        plan: &Plan,
+    ) -> Result<Self> {
+        let (levels, usable) = level::build(ctx, photos, symmetries, plan)?;
+        let sizes = photos.iter().map(|(photo, _)| (photo.height(), photo.width())).collect();
+        Ok(Self { sizes, levels, usable })
     }
 
     /// Steps of progress that one [`run`] counts.
@@ -92,16 +105,17 @@ impl<'a> Exemplar<'a> {
 ///
 /// # Errors
 /// See [`tile`](crate::tile).
-pub fn run(ctx: &Ctx, exemplar: &Exemplar<'_>, plan: &Plan) -> Result<SourceMap> {
+pub fn run(ctx: &Ctx, exemplar: &Exemplar, plan: &Plan) -> Result<SourceMap> {
     let levels = &exemplar.levels;
     let n_coarse = levels.len() - 1;
     let mut pass = 0;
+    let mut balance = Balance::new(exemplar.sizes.len());
     let mut field: Option<Field> = None;
     for (j, level) in levels.iter().enumerate().rev() {
         let (h, w) = level.size;
         let mut f = match field.take() {
             None => Field::random(h, w, &level.source, ctx.seed),
-            Some(coarse) => coarse.upsampled(h, w, &level.source, ctx.seed),
+            Some(field) => field.upsampled((h, w), &levels[j + 1].source, &level.source, ctx.seed),
         };
         let coarsest = j == n_coarse;
         let mut usage = Usage::of(&f, &level.source, plan.uniformity * level.usage_unit);
@@ -127,7 +141,11 @@ pub fn run(ctx: &Ctx, exemplar: &Exemplar<'_>, plan: &Plan) -> Result<SourceMap>
             let now = Usage::of(&f, &level.source, plan.uniformity * level.usage_unit);
             usage = now.averaged(&usage);
             let search = Search { pass, ..search };
-            patchmatch::pass(ctx, &target, &level.source, &usage, plan.wrap, search, &mut f)?;
+            let unit = f64::from(plan.uniformity) * level.patch_variance;
+            let costs = balance.costs(&f, &level.source, unit);
+            let balanced = costs.map(|c| usage.clone().with_picture_costs(&level.source, &c));
+            let usage = balanced.as_ref().unwrap_or(&usage);
+            patchmatch::pass(ctx, &target, &level.source, usage, plan.wrap, search, &mut f)?;
             pass += 1;
         }
         field = Some(f);
@@ -140,25 +158,61 @@ pub fn run(ctx: &Ctx, exemplar: &Exemplar<'_>, plan: &Plan) -> Result<SourceMap>
     let votes = vote(ctx.simd, &field, &finest.source, plan.wrap);
     let canvas = seams::Canvas {
         source: &finest.source.image,
-        usable: exemplar.mask.map(Mask::usable),
+        atlas: &finest.source.atlas,
+        usable: exemplar.usable.as_deref(),
         target: &without_apron(&votes, plan, plan.size),
         wrap: plan.wrap,
     };
     seams::settle(ctx, &canvas, &mut yx, SEAM_SWEEPS)?;
-    SourceMap::new(plan.size, exemplar.photo, yx)
+    named(yx, &finest.source.atlas, exemplar, plan)
 }
 
-/// Peak memory of [`run`] besides the photo itself, for a photo and an output of these sizes
-/// (height, width), in bytes; generous by a quarter.
-pub fn memory_bytes(photo: (usize, usize), output: (usize, usize)) -> u64 {
-    // Per photo pixel: linear light of this level and the next (12 + 7), codes with and without
-    // contrast (8), sums of squares and norms of all levels (4 + 8 * 2.45 / 2).
-    const PHOTO: u64 = 44;
+/// The source map of pixels of an atlas.
+fn named(
+    yx: Vec<seams::From>,
+    atlas: &Atlas,
+    exemplar: &Exemplar,
+    plan: &Plan,
+) -> Result<SourceMap> {
+    if atlas.is_plain() {
+        return SourceMap::new(plan.size, exemplar.sizes[0], yx);
+    }
+    let named = yx.into_iter().map(|[y, x]| {
+        let at = (y as usize, x as usize);
+        let view = &atlas.views()[atlas.view_at(at.0, at.1).unwrap_or(0)];
+        let (y, x) = view.source(at);
+        let origin = Origin { photo: view.picture as u16, symmetry: view.symmetry };
+        ([y as u32, x as u32], origin)
+    });
+    let (yx, origins) = named.unzip();
+    SourceMap::of_views(plan.size, exemplar.sizes.clone(), yx, origins)
+}
+
+/// Peak memory of the analysis and a [`run`] besides the photos themselves, for photos and an output
+/// of these sizes (height, width) in this many symmetries, in bytes; generous by a quarter. `None` if
+/// the photos do not fit into one atlas.
+pub fn memory_bytes(
+    photos: &[(usize, usize)],
+    symmetries: &[Symmetry],
+    output: (usize, usize),
+) -> Option<u64> {
+    // Per photo pixel: linear light of this level and the next (12 + 7).
+    const PHOTO: u64 = 19;
+    // Per atlas pixel: codes with and without contrast (8), sums of squares and norms of all levels
+    // (4 + 8 * 2.45 / 2).
+    const ATLAS: u64 = 25;
+    // The same where views are copied side by side: also each photo's own codes (4), and what is
+    // usable, flag by flag (2 + 2.45) and as a list (4 * 2.45).
+    const VIEWS: u64 = 19;
     // Per output pixel: two fields (8), votes (8), canvas (4), three source maps (24), or the costs'
     // colours (20).
     const OUTPUT: u64 = 48;
+    let atlas = Atlas::new(photos, symmetries)?;
     let pixels = |(h, w): (usize, usize)| h as u64 * w as u64;
-    (PHOTO * pixels(photo) + OUTPUT * pixels(output)) / 4 * 5
+    let each = if atlas.is_plain() { ATLAS } else { ATLAS + VIEWS };
+    let photos: u64 = photos.iter().map(|&photo| pixels(photo)).sum();
+    let atlas = pixels((atlas.height(), atlas.width()));
+    Some((PHOTO * photos + each * atlas + OUTPUT * pixels(output)) / 4 * 5)
 }
 
 /// Picks what to do at a level: iterations, and how far to search.
