@@ -163,7 +163,31 @@ mod gathering {
         }
     }
 
-    /// A bright and a dark photo: both have a share in the pooled target, and in every quarter.
+    /// Photos are used in proportion to what they have to give. Left to itself, the search ends at
+    /// the one that is easier to match.
+    #[test]
+    fn every_photo_has_its_share() {
+        let photo = pebbles(100, 100, 5).picture();
+        let also = [grain(60, 100, 2).picture(), stained(90, 60, 3).picture()];
+        let areas = [94 * 94, 54 * 94, 84 * 54].map(f64::from);
+        let inputs = Inputs { also: &also, ..Inputs::new(&photo) };
+        let share = |uniformity: f32, photo: u16| {
+            let quality = Quality::Normal;
+            let params = TileParams { uniformity, quality, ..draft(Symmetries::None, 96, 96) };
+            let tile = run(&inputs, &params, 2);
+            let origins = map_of(&tile).origins().expect("origins").to_vec();
+            origins.iter().filter(|o| o.photo == photo).count() as f64 / origins.len() as f64
+        };
+        let fair = |i: usize| areas[i] / areas.iter().sum::<f64>();
+        for photo in 0..3 {
+            let (got, want) = (share(1.0, photo), fair(usize::from(photo)));
+            assert!((got / want - 1.0).abs() < 0.3, "photo {photo}: {got:.3}, fair {want:.3}");
+        }
+        let off = (0..3).map(|i| (share(0.0, i) / fair(usize::from(i)) - 1.0).abs());
+        assert!(off.fold(0.0, f64::max) > 0.3, "not balanced if switched off");
+    }
+
+    /// A bright and a dark photo: both have a share in the pooled target.
     #[test]
     fn both_of_two_unlike_photos_are_used_everywhere() {
         let of = |light: f64, seed| {

@@ -119,6 +119,7 @@ pub fn run(ctx: &Ctx, exemplar: &Exemplar, plan: &Plan) -> Result<SourceMap> {
         };
         let coarsest = j == n_coarse;
         let mut usage = Usage::of(&f, &level.source, plan.uniformity * level.usage_unit);
+        let areas = balance::areas(&level.source, exemplar.sizes.len());
         let (iterations, search) = effort(plan, level, coarsest);
         for i in 0..iterations {
             let mut votes = vote(ctx.simd, &f, &level.source, plan.wrap);
@@ -142,7 +143,7 @@ pub fn run(ctx: &Ctx, exemplar: &Exemplar, plan: &Plan) -> Result<SourceMap> {
             usage = now.averaged(&usage);
             let search = Search { pass, ..search };
             let unit = f64::from(plan.uniformity) * level.patch_variance;
-            let costs = balance.costs(&f, &level.source, unit);
+            let costs = balance.costs(&f, &level.source, &areas, unit);
             let balanced = costs.map(|c| usage.clone().with_picture_costs(&level.source, &c));
             let usage = balanced.as_ref().unwrap_or(&usage);
             patchmatch::pass(ctx, &target, &level.source, usage, plan.wrap, search, &mut f)?;
