@@ -11,9 +11,10 @@ PHOTO ?=
 BENCH ?=
 EXEMPLARS ?= ../shared/exemplars
 GALLERY ?=
+QUALITY ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-rust test-python lint format gallery readme-pictures bench bench-peers bench-record wheel ci clean
+.PHONY: help setup demo test test-rust test-python lint format gallery quality readme-pictures bench bench-peers bench-record wheel ci clean
 
 help: ## List the targets.
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-15s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -68,6 +69,9 @@ format: $(BIN)/.ready ## Format everything.
 
 gallery: setup ## Tile every exemplar and write contact sheets, in gallery/ (GALLERY='--class stains').
 	$(BIN)/python docs/gallery.py "$(EXEMPLARS)" $(GALLERY)
+
+quality: setup ## Print costs, sharpness and verbatim blocks of tiles of EXEMPLARS against the baseline.
+	$(BIN)/python docs/quality.py "$(EXEMPLARS)" $(QUALITY)
 
 readme-pictures: setup ## Make the README's pictures anew, in docs/pictures/.
 	$(BIN)/python docs/readme_pictures.py

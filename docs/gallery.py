@@ -10,29 +10,17 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import html
-import re
 import sys
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import contact
 import numpy as np
+import photos
 import texforge
 from PIL import Image
 
-if TYPE_CHECKING:
-    import numpy.typing as npt
-
 METHODS: tuple[texforge.Method, ...] = ("wrap-only", "stationary")
-SUFFIXES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".exr"}
-OTHER_MAPS = re.compile(
-    r"(^|[-_. ])(ao|arm|orm|disp|displacement|height|metal|metallic|nor|normal|normalgl|normaldx"
-    r"|nrm|occlusion|opacity|rough|roughness)([-_. ]|$)"
-)
-"""Words in the names of files that are no base colours."""
-SHRINK = 4
-"""Photos whose shorter side is longer than this many tiles are made smaller first."""
 
 
 @dataclasses.dataclass
@@ -43,53 +31,6 @@ class Page:
     sheet: str = ""
     rows: list[tuple[str, ...]] = dataclasses.field(default_factory=list)
     failures: list[str] = dataclasses.field(default_factory=list)
-
-
-def reduced(photo: texforge.Image, side: int) -> texforge.Image:
-    """Return the photo, averaged over squares of pixels if it is much larger than the tile."""
-    factor = min(photo.shape[:2]) // (SHRINK * side)
-    if factor < 2:
-        return photo
-    array = np.asarray(photo)
-    height, width = (n // factor for n in array.shape[:2])
-    blocks = array[: height * factor, : width * factor].reshape(
-        height, factor, width, factor, *array.shape[2:]
-    )
-    mean = blocks.mean(axis=(1, 3), dtype=np.float64)
-    if array.dtype.kind in "ui":
-        mean = np.rint(mean)
-    return texforge.Image.tagged(mean.astype(array.dtype), photo.encoding)
-
-
-def lightness(picture: Image.Image) -> npt.NDArray[np.float64]:
-    """Return CIE L* of a picture as shown."""
-    srgb = np.asarray(picture, dtype=np.float64) / 255
-    linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
-    y = linear @ np.array([0.2126, 0.7152, 0.0722])
-    star: npt.NDArray[np.float64] = np.where(y > 216 / 24389, 116 * np.cbrt(y) - 16, y * 24389 / 27)
-    return star
-
-
-def gradient(picture: Image.Image, used: npt.NDArray[np.bool_]) -> float:
-    """Return the mean absolute difference of L* between neighbouring pixels that are used."""
-    plane = lightness(picture)
-    differences = [
-        np.abs(np.diff(plane, axis=axis))[
-            np.take(used, range(1, used.shape[axis]), axis)
-            & np.take(used, range(used.shape[axis] - 1), axis)
-        ]
-        for axis in (0, 1)
-    ]
-    both = np.concatenate(differences)
-    return float(both.mean()) if both.size else 0.0
-
-
-def opaque(image: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
-    """Return where a picture is wholly opaque."""
-    if image.ndim == 3 and image.shape[2] in (2, 4):
-        full = 1.0 if image.dtype.kind == "f" else np.iinfo(image.dtype).max
-        return np.asarray(image[:, :, -1] >= full)
-    return np.ones(image.shape[:2], dtype=bool)
 
 
 def middle(picture: Image.Image, width: int, height: int) -> Image.Image:
@@ -108,11 +49,11 @@ def scaled(picture: Image.Image, scale: float) -> Image.Image:
 def row(path: Path, out: Path, seed: int, side: int, page: Page) -> list[contact.Cell]:
     """Tile one photograph in every way; return its row of the sheet."""
     whole = texforge.read_image(path)
-    photo = reduced(whole, side)
+    photo = photos.reduced(whole, side)
     side = min(side, *photo.shape[:2])
     scale = min(1.0, 0.5 * 384 / side)
     seen = contact.shown(photo, photo.encoding)
-    sharp = gradient(seen, opaque(photo))
+    sharp = photos.gradient(seen, photos.opaque(photo))
     height, width = photo.shape[:2]
     label = f"{path.name} {width} x {height}"
     if photo is not whole:
@@ -128,7 +69,7 @@ def row(path: Path, out: Path, seed: int, side: int, page: Page) -> list[contact
         tile = texforge.tile(photo, size=side, method=method, seed=seed)
         seconds = time.perf_counter() - started
         once = contact.shown(tile.image, tile.encoding)
-        ratio = gradient(once, opaque(tile.image)) / sharp if sharp else 1.0
+        ratio = photos.gradient(once, photos.opaque(tile.image)) / sharp if sharp else 1.0
         texture = tile.costs.texture or 0.0
         caption = (
             f"{method}, seed {seed}: texture {texture:.2f}, stationarity "
@@ -191,15 +132,7 @@ def main() -> int:
     if not folder.is_dir():
         print(f"gallery: skipped, there is no folder {folder}")
         return 0
-    classes: dict[str, list[Path]] = {}
-    for path in sorted(folder.rglob("*")):
-        parts = path.relative_to(folder).parts
-        name = parts[0] if len(parts) > 1 else folder.name
-        wanted = path.suffix.lower() in SUFFIXES and arguments.only in str(path)
-        if arguments.classes and name not in arguments.classes:
-            continue
-        if wanted and not OTHER_MAPS.search(path.stem.lower()):
-            classes.setdefault(name, []).append(path)
+    classes = photos.by_class(folder, arguments.classes, arguments.only)
     pages = []
     for name, paths in classes.items():
         page = Page(name)

@@ -30,9 +30,9 @@ pub use base::error::{Error, ErrorKind, Result};
 pub use image::mask::Mask;
 pub use image::material::MapKind;
 pub use image::picture::{Encoding, Picture, Samples};
+pub use image::sigma_map::SigmaMap;
 pub use image::sourcemap::{Origin, SourceMap};
 pub use image::symmetry::Symmetry;
 pub use verb::inputs::Inputs;
-pub use verb::tile::{
-    Axis, Costs, Measure, Method, Quality, Report, Size, Symmetries, Tile, TileParams, tile, tiles,
-};
+pub use verb::params::{Axis, Measure, Method, Quality, Size, Symmetries, TileParams};
+pub use verb::tile::{Costs, Report, Tile, tile, tiles};

@@ -2,12 +2,15 @@
 
 #![allow(dead_code, reason = "each benchmark uses its own part")]
 
+pub(crate) mod barnes;
+
 use criterion::Throughput;
 use criterion::measurement::{Measurement, ValueFormatter, WallTime};
 use texforge::base::rng::Rng;
 use texforge::search::field::{Field, Pos};
 use texforge::search::patch::{Kernel, MatchImage, WithKernel, with_kernel};
-use texforge::search::patchmatch::{Search, Usage, Wrap, pass};
+use texforge::search::patchmatch::{Search, Wrap, pass};
+use texforge::search::place_cost::PlaceCost;
 use texforge::search::source::Source;
 use texforge::{Ctx, Result, Simd};
 
@@ -150,7 +153,7 @@ pub(crate) fn nearest(
 ) -> Result<Field> {
     let (h, w) = (target.height() - source.patch + 1, target.width() - source.patch + 1);
     let mut field = Field::random(h, w, source, ctx.seed);
-    let usage = Usage::free(source);
+    let usage = PlaceCost::free(source);
     for i in 0..passes {
         let search = Search { pass: i, radius: 0, n_random };
         pass(ctx, target, source, &usage, OPEN, search, &mut field)?;

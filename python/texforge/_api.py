@@ -44,9 +44,11 @@ def tile(
     axis: Axis = "both",
     method: Method = "stationary",
     measure: Measure = "histogram",
+    order: int = 2,
     sigma: float = 0.1,
     patch: int = 11,
     uniformity: float = 1.0,
+    rarity: float = 1.0,
     quality: Quality = "normal",
     avoid_grow: int = 0,
     flatten: float = 0.0,
@@ -55,6 +57,7 @@ def tile(
     also: Sequence[ImageLike] | None = None,
     mask: ImageLike | None = None,
     avoid: ImageLike | None = None,
+    sigma_map: ImageLike | None = None,
     maps: Mapping[str, ImageLike | Sequence[ImageLike]] | None = None,
     encoding: Encoding | Literal["auto"] = "auto",
     threads: int | None = None,
@@ -78,8 +81,13 @@ def tile(
         In which directions the tile repeats: ``"x"`` horizontally only, ``"y"`` vertically only.
     method : {"stationary", "wrap-only", "no-wrap", "make-seamless"}
         How the tile is made. All but the first are baselines to compare with.
-    measure : {"histogram", "none"}
-        The statistic that is made equal everywhere in the tile.
+    measure : {"histogram", "moments", "steerable", "none"}
+        The statistic that is made equal everywhere in the tile: the histograms of the colours,
+        their moments, or the histograms of the responses to filters of four orientations, which
+        know fine structure but no shades.
+    order : int
+        With the measure ``"moments"``, how many of them, 1 to 4: the mean, the variance, the
+        skewness, the kurtosis.
     sigma : float
         Reach of the measure, as a fraction of the tile's shorter side, 0.01 to 1. Smaller evens
         out smaller stains, larger keeps more variety.
@@ -88,6 +96,9 @@ def tile(
         features whole, smaller mixes more.
     uniformity : float
         How strongly every part of the photo is made to contribute equally, 0 (not at all) to 100.
+    rarity : float
+        How strongly single things that catch the eye (a leaf, a nail, a dark spot) are held
+        back, 0 (not at all) to 4. For the method ``"stationary"``.
     quality : {"draft", "normal", "best"}
         How much time to spend.
     avoid_grow : int
@@ -112,6 +123,10 @@ def tile(
     avoid : (H, W) array_like, or Pillow image, optional
         What must not be copied from the photo, such as stains: marks that are True, or at least
         half of full scale. May be given together with `mask`.
+    sigma_map : (H', W') array_like, or Pillow image, optional
+        Sigma at every pixel of the tile (and of its size), in place of `sigma`. Floats are sigma
+        itself, 0.01 to 1. Of integers black is 0.01, half of full scale 0.1 and white 1, in even
+        factors. ``costs.stationarity`` is measured with `sigma` still.
     maps : mapping of str to array_like, optional
         Other maps of the same material by name, to be tiled the same way. The name decides what
         a map is: base colour and emission are colours, normals are vectors (turned with the photo
@@ -223,6 +238,7 @@ def _tiles(
     also: Sequence[ImageLike] | None,
     mask: ImageLike | None,
     avoid: ImageLike | None,
+    sigma_map: ImageLike | None,
     maps: Mapping[str, ImageLike | Sequence[ImageLike]] | None,
     encoding: Encoding | Literal["auto"],
     threads: int | None,
@@ -251,6 +267,9 @@ def _tiles(
             also=[other.packed() for other in further],
             mask=None if mask is None else _arrays.mask(mask).packed(),
             avoid=None if avoid is None else _arrays.mask(avoid, "the avoid mask").packed(),
+            sigma_map=None
+            if sigma_map is None
+            else _arrays.picture(sigma_map, "the sigma map", "data").packed(),
             maps=[
                 (name, [other.packed() for other in all_of_it], kinds[name])
                 for name, all_of_it in others.items()

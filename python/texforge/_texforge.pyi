@@ -34,6 +34,7 @@ def tiles(
     also: list[_Picture],
     mask: _Picture | None,
     avoid: _Picture | None,
+    sigma_map: _Picture | None,
     maps: list[tuple[str, list[_Picture], str]],
     params: list[tuple[str, str]],
     seed: int,

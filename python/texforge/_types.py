@@ -39,7 +39,9 @@ Method: TypeAlias = (
     Literal["stationary"] | Literal["wrap-only"] | Literal["no-wrap"] | Literal["make-seamless"]
 )
 """How a tile is made."""
-Measure: TypeAlias = Literal["histogram"] | Literal["none"]
+Measure: TypeAlias = (
+    Literal["histogram"] | Literal["moments"] | Literal["steerable"] | Literal["none"]
+)
 """The statistic that is made equal everywhere in a tile."""
 Quality: TypeAlias = Literal["draft"] | Literal["normal"] | Literal["best"]
 """How much time to spend."""
@@ -84,9 +86,11 @@ class TileOptions(TypedDict, total=False):
     axis: Axis
     method: Method
     measure: Measure
+    order: int
     sigma: float
     patch: int
     uniformity: float
+    rarity: float
     quality: Quality
     avoid_grow: int
     flatten: float
@@ -95,6 +99,7 @@ class TileOptions(TypedDict, total=False):
     also: Sequence[ImageLike] | None
     mask: ImageLike | None
     avoid: ImageLike | None
+    sigma_map: ImageLike | None
     maps: Mapping[str, ImageLike | Sequence[ImageLike]] | None
     encoding: Encoding | Literal["auto"]
     threads: int | None
@@ -143,11 +148,19 @@ class Costs:
         None for the method ``"make-seamless"``, which blends.
     stationarity : float
         Mean earth mover's distance between the local histograms of two places of the tile, in
-        CIE L*a*b* units. High where one part of the tile looks different from another.
+        CIE L*a*b* units. High where one part of the tile looks different from another. The same
+        for all measures, so that tiles can be compared.
+    stationarity_by_measure : float or None
+        The cost under the measure that the tile was made with. ``"histogram"``: as
+        `stationarity`. ``"moments"``: mean squared difference of two places' moments (of values
+        counted from the mean in tens of units), in CIE L*a*b* units squared. ``"steerable"``: mean
+        earth mover's distance, summed over twelve responses. To be compared between tiles of
+        the same measure and order only. None for ``"none"``.
     """
 
     texture: float | None
     stationarity: float
+    stationarity_by_measure: float | None
 
     def __str__(self) -> str:
         """Say both in words."""

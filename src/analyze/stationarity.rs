@@ -1,11 +1,12 @@
 //! Stationarity cost: how different the places of a texture are from each other.
 
-use crate::signal::histogram::{SOFT_MAX, Soft, rounded};
-use crate::signal::localhist::{Domain, LocalDistributions};
+use crate::signal::measure::Statistic;
+use crate::signal::window::{Domain, Window};
 
 /// Mean earth mover's distance between the local histograms of two places of the picture, over
 /// all pairs of places, summed over the three channels (in the pixels' units); 0 for a picture
-/// that is the same everywhere. `sigma` is the window's standard deviation in pixels.
+/// that is the same everywhere. `sigma` is the window's standard deviation in pixels. The cost that
+/// all tiles report, so that they can be compared; [`Statistic::cost`] has the other measures.
 ///
 /// # Paper
 /// Moritz et al. 2017, eq. 1 with the histogram measure of eq. 3, of 128 bins over each channel's
@@ -14,20 +15,7 @@ use crate::signal::localhist::{Domain, LocalDistributions};
 /// # Determinism
 /// Same bytes for any thread count.
 pub fn histogram_cost(pixels: &[[f32; 3]], domain: Domain, sigma: f64) -> f64 {
-    (0..3)
-        .map(|k| {
-            let ends = (f32::MAX, f32::MIN);
-            let (low, high) = pixels.iter().fold(ends, |(l, h), px| (l.min(px[k]), h.max(px[k])));
-            if low >= high {
-                return 0.0;
-            }
-            let scale = SOFT_MAX as f32 / (high - low);
-            let soft: Vec<Soft> =
-                pixels.iter().map(|px| [rounded((px[k] - low) * scale), 0, 0, 0]).collect();
-            let codes = LocalDistributions::new(&soft, None, 0, domain, sigma).mean_distance();
-            codes * f64::from(high - low) / 127.0
-        })
-        .sum()
+    Statistic::Histogram.cost(pixels, domain, &Window::even(sigma))
 }
 
 #[cfg(test)]

@@ -9,7 +9,8 @@ use crate::base::error::Result;
 use crate::base::params::{Param, Value as _};
 use crate::cli::maps;
 use crate::image::material::MapKind;
-use crate::verb::tile::{MAX_VARIANTS, TileParams};
+use crate::verb::params::TileParams;
+use crate::verb::tile::MAX_VARIANTS;
 
 const TILE_EXAMPLES: &str = "\
 Examples:
@@ -116,6 +117,11 @@ fn tile() -> Command {
             file("avoid", "FILE", "Picture of the photo's size whose marks are never copied: where its first channel is \
                  at least half of full scale and its alpha, if any, too; --avoid-grow widens the marks")
                 .long("avoid"),
+        )
+        .arg(
+            file("sigma-map", "FILE", "Grey picture of the tile's size that says sigma at every pixel, in place of \
+                 --sigma: floats are sigma itself, of integers black is 0.01, mid grey 0.1 and white 1, in even factors")
+                .long("sigma-map"),
         )
         .arg(
             Arg::new("map")

@@ -51,6 +51,9 @@ pub(super) fn hint(error: &Error, command: &str, flags: &[String]) -> Option<Str
         Error::TooSmall { .. } => Some(format!("change {}", first(&["patch", "size"])?)),
         Error::EmptyMask { .. } => Some(format!("change {}", first(&["mask", "avoid", "patch"])?)),
         Error::Memory { .. } => Some(format!("change {}", first(&["size", "symmetry"])?)),
+        Error::SizeMismatch { what, .. } if what.contains("sigma map") => {
+            Some(format!("change {}", first(&["sigma-map"])?))
+        }
         Error::SizeMismatch { what, .. } if what.contains("avoid") => {
             Some(format!("change {}", first(&["avoid"])?))
         }

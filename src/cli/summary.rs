@@ -7,10 +7,12 @@ use std::time::Duration;
 use serde::{Serialize, Serializer};
 
 use crate::base::ctx::Ctx;
+use crate::base::params::Value as _;
 use crate::cli::output::Target;
 use crate::cli::show::duration;
 use crate::cli::small::{SCHEMA_VERSION, typed};
-use crate::verb::tile::{Costs, Report, Size, TileParams};
+use crate::verb::params::{Measure, Size, TileParams};
+use crate::verb::tile::{Costs, Report};
 
 /// A file that the run writes.
 #[derive(Debug, Clone, Serialize)]
@@ -154,10 +156,15 @@ pub(super) fn summary(
 }
 
 /// The line at the end of a tile.
-pub(super) fn line(asked: Size, target: &Target, report: &Report, elapsed: Duration) -> String {
+pub(super) fn line(
+    asked: &TileParams,
+    target: &Target,
+    report: &Report,
+    elapsed: Duration,
+) -> String {
     let (w, h) = report.tile_size;
     let (photo_w, photo_h) = report.photo_size;
-    let why = if asked == Size::Auto {
+    let why = if asked.size == Size::Auto {
         format!(" (default size for a {photo_w}x{photo_h} photo)")
     } else {
         String::new()
@@ -166,10 +173,14 @@ pub(super) fn line(asked: Size, target: &Target, report: &Report, elapsed: Durat
         Target::Stdout => "standard output".into(),
         Target::File(path) => path.display().to_string(),
     };
-    let Costs { texture, stationarity } = report.costs;
+    let Costs { texture, stationarity, stationarity_by_measure } = report.costs;
     let texture = texture.map_or(String::new(), |cost| format!("texture cost {cost:.2}, "));
+    let measure = asked.measure;
+    let by_measure = stationarity_by_measure
+        .filter(|_| measure != Measure::Histogram)
+        .map_or(String::new(), |cost| format!(" (by {}: {cost:.3})", measure.show()));
     format!(
-        "{place}  {w}x{h}{why}, seed {}, {}, {texture}stationarity cost {stationarity:.2}",
+        "{place}  {w}x{h}{why}, seed {}, {}, {texture}stationarity cost {stationarity:.2}{by_measure}",
         report.seed,
         duration(elapsed),
     )

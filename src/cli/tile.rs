@@ -16,8 +16,10 @@ use crate::cli::{args, files, preview};
 use crate::image::mask::Mask;
 use crate::image::material::{MapKind, Sibling};
 use crate::image::picture::Picture;
+use crate::image::sigma_map::SigmaMap;
 use crate::verb::inputs::Inputs;
-use crate::verb::tile::{Method, Tile, TileParams, tiles};
+use crate::verb::params::{Method, TileParams};
+use crate::verb::tile::{Tile, tiles};
 
 /// What was typed, checked as far as it can be without looking at a file.
 #[derive(Debug)]
@@ -29,6 +31,7 @@ struct Request {
     params: TileParams,
     mask: Option<PathBuf>,
     avoid: Option<PathBuf>,
+    sigma_map: Option<PathBuf>,
     maps: Vec<Wanted>,
     pick_up: bool,
     force: bool,
@@ -104,6 +107,7 @@ impl Request {
             params,
             mask: path("mask"),
             avoid: path("avoid"),
+            sigma_map: path("sigma-map"),
             maps,
             force: wants("force"),
         })
@@ -114,6 +118,7 @@ impl Request {
         maps.chain(&self.photos)
             .chain(&self.mask)
             .chain(&self.avoid)
+            .chain(&self.sigma_map)
             .map(PathBuf::as_path)
             .collect()
     }
@@ -192,7 +197,17 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Vec
     };
     let mask = read_mask(&request.mask, "the mask")?;
     let avoid = read_mask(&request.avoid, "the avoid mask")?;
-    let inputs = Inputs { photo: &photo, also: &also, mask: mask.as_ref(), avoid: avoid.as_ref() };
+    let sigma_map = match &request.sigma_map {
+        None => None,
+        Some(path) => Some(SigmaMap::from_picture(&files::read(path, MapKind::Data)?)?),
+    };
+    let inputs = Inputs {
+        also: &also,
+        mask: mask.as_ref(),
+        avoid: avoid.as_ref(),
+        sigma_map: sigma_map.as_ref(),
+        ..Inputs::new(&photo)
+    };
     let maps = read_maps(session, request, &inputs, &mut notes)?;
     request.check_outputs(&maps)?;
     files::ensure_can_hold(&photo, request.places[0].tile.file(), MapKind::Color)?;
@@ -256,7 +271,7 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Vec
         session.console.say(&format!("note: {note}"));
     }
     let elapsed = session.console.elapsed();
-    let line = |(target, report): &_| summary::line(request.params.size, target, report, elapsed);
+    let line = |(target, report): &_| summary::line(&request.params, target, report, elapsed);
     let lines = done.iter().map(line).collect();
     Ok((summary::summary(ctx, &request.photos, &done, notes, written, elapsed), lines))
 }

@@ -6,5 +6,6 @@ pub mod mask;
 pub mod material;
 pub mod normals;
 pub mod picture;
+pub mod sigma_map;
 pub mod sourcemap;
 pub mod symmetry;

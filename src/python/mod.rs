@@ -22,8 +22,10 @@ use crate::image::io::{self, Format, WriteOptions};
 use crate::image::mask::Mask;
 use crate::image::material::{self, MapKind};
 use crate::image::picture::Picture;
+use crate::image::sigma_map::SigmaMap;
 use crate::verb::inputs::Inputs;
-use crate::verb::tile::{Tile, TileParams};
+use crate::verb::params::TileParams;
+use crate::verb::tile::Tile;
 use array::{ArrayIn, ArrayOut, MapIn, MapOut, array_out, map_out};
 use error::IntoPy;
 
@@ -44,13 +46,14 @@ type TileOut<'py> = (ArrayOut<'py>, Option<MapOut<'py>>, Vec<(String, ArrayOut<'
     clippy::too_many_arguments,
     reason = "one private caller, in _api.py, passes them by name"
 )]
-#[pyo3(signature = (*, photo, also, mask, avoid, maps, params, seed, count, threads, progress))]
+#[pyo3(signature = (*, photo, also, mask, avoid, sigma_map, maps, params, seed, count, threads, progress))]
 fn tiles<'py>(
     py: Python<'py>,
     photo: ArrayIn<'py>,
     also: Vec<ArrayIn<'py>>,
     mask: Option<ArrayIn<'py>>,
     avoid: Option<ArrayIn<'py>>,
+    sigma_map: Option<ArrayIn<'py>>,
     maps: Vec<NamedMap<'py>>,
     params: Vec<(String, String)>,
     seed: u64,
@@ -72,6 +75,10 @@ fn tiles<'py>(
         mask.map(|mask| Mask::from_picture(&mask)).transpose().into_py(py)
     };
     let (mask, avoid) = (read_mask(mask)?, read_mask(avoid)?);
+    let sigma_map = match sigma_map {
+        Some(map) => Some(SigmaMap::from_picture(&map.picture(py)?).into_py(py)?),
+        None => None,
+    };
     let mut others = Vec::with_capacity(maps.len());
     for (name, maps, kind) in &maps {
         let (maps, kind) = (pictures(maps)?, kind_named(kind).into_py(py)?);
@@ -83,8 +90,13 @@ fn tiles<'py>(
     let ctx = Ctx::new(seed, threads).into_py(py)?;
     let job = ctx.job();
     let made = enter::enter(py, &job, progress.as_ref(), move || {
-        let inputs =
-            Inputs { photo: &photo, also: &also, mask: mask.as_ref(), avoid: avoid.as_ref() };
+        let inputs = Inputs {
+            also: &also,
+            mask: mask.as_ref(),
+            avoid: avoid.as_ref(),
+            sigma_map: sigma_map.as_ref(),
+            ..Inputs::new(&photo)
+        };
         let gather = |tile: Tile| {
             let gathered = tile.source_map.iter().flat_map(|source_map| {
                 let gather = |(name, maps, kind): &(String, Vec<Picture>, MapKind)| {

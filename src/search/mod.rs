@@ -4,6 +4,8 @@ pub mod atlas;
 pub mod field;
 pub mod patch;
 pub mod patchmatch;
+pub mod place_cost;
+pub mod rarity;
 pub mod seams;
 pub mod source;
 pub mod vote;

@@ -11,6 +11,7 @@ use crate::base::error::Result;
 use crate::base::rng::Rng;
 use crate::search::field::{Field, Pos};
 use crate::search::patch::{Kernel, MatchImage, WithKernel, with_kernel};
+use crate::search::place_cost::PlaceCost;
 use crate::search::source::Source;
 
 /// Rows of a band. Fewer rows: more parallel work, slower propagation between bands.
@@ -39,124 +40,12 @@ pub struct Search {
     pub n_random: u32,
 }
 
-/// How often each place of the source is used, as a cost (Kaspar et al. 2015, spatial uniformity).
-#[derive(Debug, Clone)]
-pub struct Usage {
-    cols: usize,
-    shift: u32,
-    cost: Vec<i32>,
-}
-
-impl Usage {
-    /// No cost anywhere.
-    pub fn free(source: &Source) -> Self {
-        let shift = cell_shift(source.patch);
-        let cols = (source.cols() >> shift) + 1;
-        Self { cols, shift, cost: vec![0; cols * ((source.rows() >> shift) + 1)] }
-    }
-
-    /// The cost of using each source patch once more: `weight * occurrence / w_best`, where the
-    /// occurrence (how many matched patches cover a pixel) is averaged over the patch.
-    ///
-    /// # Paper
-    /// Moritz et al. 2017, eq. 6: `w_best = max(1, |T| / |S|) * N^2`. Counts are kept on a grid of
-    /// cells of a third of a patch, which a patch average cannot tell from pixels.
-    pub fn of(field: &Field, source: &Source, weight: f32) -> Self {
-        let mut usage = Self::free(source);
-        let (shift, n) = (usage.shift, source.patch);
-        let (cols, rows) = (usage.cols, (source.rows() >> shift) + 1);
-        let mut count = vec![0u32; rows * cols];
-        for pos in &field.pos {
-            count[(pos.y() >> shift) * cols + (pos.x() >> shift)] += 1;
-        }
-        // The box of "covers the pixel" and the box of "averaged over the patch" make a tent.
-        let reach = (n >> shift).max(1);
-        let tent = |v: &[f32], out: &mut [f32]| {
-            for (i, out) in out.iter_mut().enumerate() {
-                let mut sum = v[i] * reach as f32;
-                for d in 1..reach {
-                    let weight = (reach - d) as f32;
-                    sum += weight * (if i >= d { v[i - d] } else { 0.0 });
-                    sum += weight * (if i + d < v.len() { v[i + d] } else { 0.0 });
-                }
-                *out = sum / (reach * reach) as f32;
-            }
-        };
-        let mut horizontal = vec![0f32; rows * cols];
-        horizontal.par_chunks_mut(cols).zip(count.par_chunks(cols)).for_each(|(out, count)| {
-            let count: Vec<f32> = count.iter().map(|&c| c as f32).collect();
-            tent(&count, out);
-        });
-        // Patches per cell; in units of one use of each pixel, every cell holds 4^shift of them.
-        let w_best = (field.pos.len() as f64 / source.n_usable() as f64).max(1.0);
-        let unit = weight as f64 / (w_best * f64::from(1u32 << (2 * shift)));
-        usage.cost.par_chunks_mut(cols).enumerate().for_each(|(y, out)| {
-            for (x, out) in out.iter_mut().enumerate() {
-                let at = |y: usize| horizontal[y * cols + x];
-                let mut sum = at(y) * reach as f32;
-                for d in 1..reach {
-                    let weight = (reach - d) as f32;
-                    sum += weight * (if y >= d { at(y - d) } else { 0.0 });
-                    sum += weight * (if y + d < rows { at(y + d) } else { 0.0 });
-                }
-                // Saturates: sums with distances cannot overflow, nor reach those of unusable patches.
-                let cost = (sum / (reach * reach) as f32) as f64 * unit;
-                *out = cost.min(f64::from(1 << 28)) as i32;
-            }
-        });
-        usage
-    }
-
-    /// The mean of this cost and an earlier one for the same source. Costs that jump from pass to
-    /// pass drive all pixels from one place to the next together; averaged, they settle.
-    #[must_use]
-    pub fn averaged(mut self, earlier: &Self) -> Self {
-        for (cost, &before) in self.cost.iter_mut().zip(&earlier.cost) {
-            *cost = cost.midpoint(before);
-        }
-        self
-    }
-
-    /// The same with a further cost for every patch of each picture of the source's atlas.
-    #[must_use]
-    pub fn with_picture_costs(mut self, source: &Source, costs: &[i32]) -> Self {
-        let cells = |from: usize, len: usize| {
-            // The cells that begin in the view; one that reaches over its end is hardly used.
-            let cell = 1 << self.shift;
-            from.div_ceil(cell)..(from + len).div_ceil(cell)
-        };
-        let rows = self.cost.len() / self.cols;
-        for view in source.atlas.views() {
-            for y in cells(view.corner.0, view.size.0).filter(|&y| y < rows) {
-                for x in cells(view.corner.1, view.size.1).filter(|&x| x < self.cols) {
-                    self.cost[y * self.cols + x] += costs[view.picture];
-                }
-            }
-        }
-        self
-    }
-
-    #[inline]
-    fn cost(&self, pos: Pos) -> i32 {
-        self.cost[(pos.y() >> self.shift) * self.cols + (pos.x() >> self.shift)]
-    }
-}
-
-/// Cells of 4 pixels for patches of 8 and more, of 2 from 4 on, else of 1.
-fn cell_shift(patch: usize) -> u32 {
-    match patch {
-        0..4 => 0,
-        4..8 => 1,
-        _ => 2,
-    }
-}
-
 /// One pass over the field: every output position takes the best of its own match, the
 /// neighbours' matches shifted by one, and random positions around the best.
 ///
 /// `target` is the output in the matching space with an apron of `patch - 1`: the patch of output
 /// pixel (y, x) has its top left corner at (y, x). The score that is minimized is the squared
-/// patch distance plus `usage`. Counts `field.height` units of progress.
+/// patch distance plus `place_cost`. Counts `field.height` units of progress.
 ///
 /// # Determinism
 /// Same bytes for any thread count and SIMD level.
@@ -167,13 +56,13 @@ pub fn pass(
     ctx: &Ctx,
     target: &MatchImage,
     source: &Source,
-    usage: &Usage,
+    place_cost: &PlaceCost,
     wrap: Wrap,
     search: Search,
     field: &mut Field,
 ) -> Result<()> {
     let mut next = field.pos.clone();
-    let band = Band { target, source, usage, wrap, search, field, seed: ctx.seed };
+    let band = Band { target, source, place_cost, wrap, search, field, seed: ctx.seed };
     // Every other pair of passes the bands are shifted by half: no row is always at an edge.
     let head = if search.pass % 4 < 2 { 0 } else { (BAND / 2).min(field.height) };
     let (first, rest) = next.split_at_mut(head * field.width);
@@ -206,7 +95,7 @@ impl WithKernel for BandJob<'_, '_> {
 struct Band<'a> {
     target: &'a MatchImage,
     source: &'a Source,
-    usage: &'a Usage,
+    place_cost: &'a PlaceCost,
     wrap: Wrap,
     search: Search,
     field: &'a Field,
@@ -353,11 +242,11 @@ impl Band<'_> {
         kernel.distance(query, &self.source.image, self.source.at(pos))
     }
 
-    /// Squared distance plus the usage cost. Unusable patches score beyond all others: every field
+    /// Squared distance plus the place's cost. Unusable patches score beyond all others: every field
     /// starts with usable ones, and keeps them.
     #[inline(always)]
     fn score(&self, pos: Pos, distance: i32) -> i32 {
-        if self.source.is_usable(pos) { distance + self.usage.cost(pos) } else { i32::MAX }
+        if self.source.is_usable(pos) { distance + self.place_cost.of(pos) } else { i32::MAX }
     }
 }
 
@@ -396,77 +285,4 @@ pub fn distances(simd: Simd, target: &MatchImage, source: &Source, field: &Field
         .into_par_iter()
         .flat_map_iter(|y| with_kernel(simd, source.patch, Distances(target, source, field, y)))
         .collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Occurrence by its definition: how many matched patches cover each pixel, averaged over the
-    /// patch at every position, over `w_best`.
-    fn naive(field: &Field, source: &Source, weight: f64) -> Vec<f64> {
-        let (n, w) = (source.patch, source.image.width());
-        let mut covers = vec![0.0; source.image.height() * w];
-        for pos in &field.pos {
-            (0..n * n).for_each(|i| covers[(pos.y() + i / n) * w + pos.x() + i % n] += 1.0);
-        }
-        let ratio = field.pos.len() as f64 / (source.rows() * source.cols()) as f64;
-        let w_best = ratio.max(1.0) * (n * n) as f64;
-        let cost = |i: usize| {
-            let (y, x) = (i / source.cols(), i % source.cols());
-            let sum: f64 = (0..n * n).map(|i| covers[(y + i / n) * w + x + i % n]).sum();
-            weight * sum / (n * n) as f64 / w_best
-        };
-        (0..source.rows() * source.cols()).map(cost).collect()
-    }
-
-    /// Cells instead of pixels, and a tent of whole cells instead of one of `patch` pixels, come
-    /// near the definition (up to a factor, see below) where the use of the photo changes over
-    /// some patches.
-    #[test]
-    fn usage_is_about_the_average_occurrence() {
-        const WEIGHT: f64 = 100_000.0;
-        for patch in [3, 5, 7, 9, 11, 15, 21] {
-            let source = Source::new(MatchImage::new(150, 160), patch, None).expect("source");
-            let (rows, cols) = (source.rows(), source.cols());
-            // Six patches a position on average, twice as many at the bottom as in the middle.
-            let draw = |i: usize| {
-                let mut rng = Rng::new(1, 9, 0, i as u64);
-                let y = rng.below(rows as u32).max(rng.below(rows as u32));
-                Pos::new(y as usize, rng.below(cols as u32) as usize)
-            };
-            let (height, width) = (300, 400);
-            let pos = (0..height * width).map(draw).collect();
-            let field = Field { height, width, pos };
-            let usage = Usage::of(&field, &source, WEIGHT as f32);
-            let want = naive(&field, &source, WEIGHT);
-            let mut ratios = Vec::new();
-            // Away from the photo's border, where either average runs out of patches.
-            for y in (rows / 3)..rows - 2 * patch {
-                for x in 2 * patch..cols - 2 * patch {
-                    ratios.push(f64::from(usage.cost(Pos::new(y, x))) / want[y * cols + x]);
-                }
-            }
-            let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
-            let worst = ratios.iter().map(|r| (r / mean - 1.0).abs()).fold(0.0, f64::max);
-            assert!(worst < 0.3, "patch {patch}: {worst:.3} off at worst");
-        }
-    }
-
-    #[test]
-    fn free_use_costs_nothing_and_even_use_its_weight() {
-        for patch in [3, 5, 7, 11, 15, 21] {
-            let side = 130 + patch - 1;
-            let source = Source::new(MatchImage::new(side, side), patch, None).expect("source");
-            let at = |i: usize| Pos::new(i / 130 % 130, i % 130);
-            let pos = (0..2 * 130 * 130).map(at).collect();
-            let field = Field { height: 260, width: 130, pos };
-            let usage = Usage::of(&field, &source, 1000.0);
-            assert_eq!(Usage::free(&source).cost(Pos::new(60, 60)), 0);
-            for (y, x) in [(60, 60), (30, 90), (98, 40)] {
-                let cost = usage.cost(Pos::new(y, x));
-                assert!(cost.abs_diff(1000) < 5, "patch {patch}: {cost} at {y}, {x}");
-            }
-        }
-    }
 }

@@ -26,7 +26,7 @@ pub fn bin_of(v: u16) -> (usize, f32) {
 
 /// Value at the lower edge of a bin, in soft codes (-32 for the first).
 #[inline]
-fn edge(bin: f32) -> f32 {
+pub fn edge(bin: f32) -> f32 {
     const WIDTH: f32 = (1 << SOFT_BITS) as f32;
     (bin - 0.5) * WIDTH
 }

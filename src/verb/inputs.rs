@@ -4,9 +4,10 @@ use crate::base::error::{Error, Result};
 use crate::image::mask::Mask;
 use crate::image::material::MapKind;
 use crate::image::picture::Picture;
+use crate::image::sigma_map::SigmaMap;
 use crate::image::sourcemap::{Origin, SourceMap};
 use crate::method::flatten::{self, Flat};
-use crate::verb::tile::TileParams;
+use crate::verb::params::TileParams;
 
 /// What a tile is made from.
 #[derive(Debug, Clone, Copy)]
@@ -22,12 +23,15 @@ pub struct Inputs<'a> {
     /// What must not be copied from the photo (size of the photo): marks, which
     /// [`TileParams::avoid_grow`] widens.
     pub avoid: Option<&'a Mask>,
+    /// How far the measure reaches at every pixel, in place of `sigma`; of the tile's size. The
+    /// histogram's cost is measured with `sigma` still, that of the measure in use with the map.
+    pub sigma_map: Option<&'a SigmaMap>,
 }
 
 impl<'a> Inputs<'a> {
     /// A photo alone.
     pub fn new(photo: &'a Picture) -> Self {
-        Self { photo, also: &[], mask: None, avoid: None }
+        Self { photo, also: &[], mask: None, avoid: None, sigma_map: None }
     }
 
     /// All photos, in their order: as they are, or `flat` in their place.

@@ -1,4 +1,5 @@
 //! Room 7: the public functions, one file each. They pick methods, combine them and report.
 
 pub mod inputs;
+pub mod params;
 pub mod tile;

@@ -8,18 +8,20 @@ use crate::analyze::{stationarity, texture};
 use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
 use crate::base::memory::ensure_available;
-use crate::base::params::{Value, choice, params};
+use crate::base::params::Value as _;
 use crate::image::color::ColorModel;
 use crate::image::mask::Mask;
 use crate::image::material::MapKind;
 use crate::image::picture::Picture;
+use crate::image::sigma_map::SigmaMap;
 use crate::image::sourcemap::SourceMap;
-use crate::image::symmetry::Symmetry;
 use crate::method::make_seamless;
 use crate::method::stationary::{self, Exemplar};
 use crate::search::patchmatch::Wrap;
-use crate::signal::localhist::Domain;
+use crate::signal::measure::Statistic;
+use crate::signal::window::Domain;
 use crate::verb::inputs::Inputs;
+use crate::verb::params::{Axis, Measure, Method, Quality, Size, Symmetries, TileParams};
 
 /// Longest side of a tile, in pixels.
 const MAX_TILE_SIDE: usize = 32_768;
@@ -29,148 +31,6 @@ pub const MAX_VARIANTS: usize = 1000;
 
 /// Least radius of the flattening: what is smaller than this share of the photo is texture.
 const LEAST_FLATTEN: f32 = 0.02;
-
-/// Size of the tile.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Size {
-    /// The largest power of two that is at most a tenth larger than the photo's shorter side, at
-    /// most 2048; not square if the photo is at least twice as long as it is wide. With
-    /// [`Method::MakeSeamless`], the photo's own size.
-    Auto,
-    /// This many pixels.
-    Pixels {
-        /// Width in pixels.
-        width: usize,
-        /// Height in pixels.
-        height: usize,
-    },
-}
-
-impl Value for Size {
-    const KIND: &'static str = "size";
-
-    fn parse(text: &str) -> Option<Self> {
-        if text == "auto" {
-            return Some(Self::Auto);
-        }
-        let (width, height) = text.split_once(['x', 'X']).unwrap_or((text, text));
-        Some(Self::Pixels { width: width.parse().ok()?, height: height.parse().ok()? })
-    }
-
-    fn show(&self) -> String {
-        match self {
-            Self::Auto => "auto".into(),
-            Self::Pixels { width, height } => format!("{width}x{height}"),
-        }
-    }
-
-    fn expected() -> String {
-        "a size as WIDTHxHEIGHT (one number for a square), or auto".into()
-    }
-}
-
-choice! {
-    /// In which directions the tile repeats.
-    pub enum Axis {
-        /// In both.
-        Both = "both",
-        /// Horizontally only (a trim sheet).
-        X = "x",
-        /// Vertically only.
-        Y = "y",
-    }
-}
-
-choice! {
-    /// How the tile is made.
-    pub enum Method {
-        /// Toroidal PatchMatch with stationarity projection (Moritz et al. 2017).
-        Stationary = "stationary",
-        /// Baseline: toroidal PatchMatch without the projection.
-        WrapOnly = "wrap-only",
-        /// Baseline: PatchMatch that does not wrap at all.
-        NoWrap = "no-wrap",
-        /// Baseline: shift by half and blend over the seam, as image editors do.
-        MakeSeamless = "make-seamless",
-    }
-}
-
-choice! {
-    /// The statistic that is made equal everywhere.
-    pub enum Measure {
-        /// Local histograms of each colour channel.
-        Histogram = "histogram",
-        /// None: the same as the method `wrap-only`.
-        None = "none",
-    }
-}
-
-choice! {
-    /// How much time to spend.
-    pub enum Quality {
-        /// A quick look.
-        Draft = "draft",
-        /// The default.
-        Normal = "normal",
-        /// More iterations; about three times the time of normal.
-        Best = "best",
-    }
-}
-
-choice! {
-    /// In which symmetries the photo's patches are used.
-    pub enum Symmetries {
-        /// As they lie.
-        None = "none",
-        /// Mirrored left to right as well.
-        Mirror = "mirror",
-        /// In all four quarter turns.
-        Rotate = "rotate",
-        /// Mirrored and turned: all eight.
-        All = "all",
-    }
-}
-
-impl Symmetries {
-    /// All that are in it; the first is the photo as it lies.
-    pub fn list(self) -> &'static [Symmetry] {
-        const MIRROR: [Symmetry; 2] = [Symmetry::ALL[0], Symmetry::ALL[4]];
-        match self {
-            Self::None => &Symmetry::ALL[..1],
-            Self::Mirror => &MIRROR,
-            Self::Rotate => &Symmetry::ALL[..4],
-            Self::All => &Symmetry::ALL,
-        }
-    }
-}
-
-params! {
-    /// Parameters of [`tile`].
-    pub struct TileParams for "tile" {
-        /// Size of the tile: WIDTHxHEIGHT, or auto for the largest power of two that about fits into the photo.
-        size: Size = Size::Auto, unit "px";
-        /// In which directions the tile repeats.
-        axis: Axis = Axis::Both;
-        /// How the tile is made; all but stationary are baselines to compare with.
-        method: Method = Method::Stationary;
-        /// The statistic that is made equal everywhere in the tile.
-        measure: Measure = Measure::Histogram;
-        /// Reach of the stationarity measure: smaller evens out smaller stains, larger keeps more variety.
-        sigma: f32 = 0.1, in 0.01..=1.0, unit "fraction of the tile's shorter side";
-        /// Side of the patches that are compared; odd. Larger keeps larger features whole, smaller mixes more.
-        patch: usize = 11, in 3..=21, unit "px";
-        /// How strongly every part of the photo is made to contribute equally; 0 switches it off.
-        uniformity: f32 = 1.0, in 0.0..=100.0;
-        /// How much time to spend.
-        quality: Quality = Quality::Normal;
-        /// How far the marks of the avoid mask are grown: nothing this near to a mark is copied.
-        avoid_grow: usize = 0, in 0..=10000, unit "px";
-        /// Reach of the light flattening, 0.02 or more: differences of light that are wider are taken out of the photo first; 0 switches it off.
-        flatten: f32 = 0.0, in 0.0..=1.0, unit "fraction of the photo's shorter side";
-        /// Whether patches are also used mirrored left to right, turned by quarters, or both: more to choose from, but light then falls from several sides.
-        symmetry: Symmetries = Symmetries::None;
-    }
-}
 
 /// What the finished tile costs, measured on the delivered picture. Lower is better.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -183,6 +43,12 @@ pub struct Costs {
     /// Stationarity cost: mean earth mover's distance between the local histograms of two places,
     /// summed over L*, a* and b* (paper eq. 1 and 3), in L*a*b* units.
     pub stationarity: f64,
+    /// The cost under the measure of the parameters: the same number for the histogram; for the
+    /// moments, the mean squared difference of two places' moments (of values counted from the
+    /// mean in tens of units), in L*a*b* units squared (paper eq. 2); for the steerable filters,
+    /// the earth mover's distance summed over twelve responses, in L*a*b* units (paper eq. 4).
+    /// `None` without a measure. Comparable between tiles of the same measure and order only.
+    pub stationarity_by_measure: Option<f64>,
 }
 
 /// How a tile was made and what it costs.
@@ -222,25 +88,6 @@ pub struct Tile {
     pub report: Report,
 }
 
-impl TileParams {
-    /// Width and height of the tile for a photo of this size: `size`, or the default if it is
-    /// [`Size::Auto`].
-    pub fn resolved_size(&self, photo_width: usize, photo_height: usize) -> (usize, usize) {
-        if let Size::Pixels { width, height } = self.size {
-            return (width, height);
-        }
-        if self.method == Method::MakeSeamless {
-            return (photo_width, photo_height);
-        }
-        let pow2 = |n: usize| (1 << (n.max(1) * 11 / 10).max(1).ilog2()).min(2048);
-        let (w, h) = (photo_width.max(1), photo_height.max(1));
-        if w >= 2 * h || h >= 2 * w {
-            return (pow2(w), pow2(h));
-        }
-        (pow2(w.min(h)), pow2(w.min(h)))
-    }
-}
-
 /// Turns a photo into a tile that repeats without a seam and without a blob that gives the
 /// repetition away.
 ///
@@ -266,8 +113,12 @@ pub fn tile(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, params: &TileParams
 /// As [`tile`], with everything that a tile can be made from, and several times: `count` tiles
 /// whose seeds are `ctx.seed` and those after it. What is learnt about the photo is learnt once.
 ///
+/// # Paper
+/// Moritz et al. 2017, Fig. 10: with a sigma map, a locally prescribed reach. Statistics are computed
+/// under windows of a few sizes and their mappings blended at every pixel.
+///
 /// # Errors
-/// As [`tile`]; [`Error::Parameter`] for a `count` that is not 1 to 1000 (1 with
+/// As [`tile`]; [`Error::SizeMismatch`] (sigma map); [`Error::Parameter`] for a `count` that is not 1 to 1000 (1 with
 /// [`Method::MakeSeamless`], which makes no random choices) and for seeds beyond the last one.
 pub fn tiles(
     ctx: &Ctx,
@@ -288,7 +139,12 @@ pub fn tiles(
     if masks[0].is_some() && params.method == Method::MakeSeamless {
         notes.push("the method make-seamless uses the whole photo; the mask is ignored".to_owned());
     }
-    let plan = plan(params, (height, width), wrap);
+    if inputs.sigma_map.is_some()
+        && (params.method != Method::Stationary || params.measure == Measure::None)
+    {
+        notes.push("nothing is made stationary; the sigma map changes no pixel".to_owned());
+    }
+    let plan = plan(params, inputs.sigma_map, (height, width), wrap);
     let (flat, exemplar) = ctx.install(|| {
         let flat = inputs.flattened(&masks, params, &mut notes)?;
         if params.method == Method::MakeSeamless {
@@ -315,8 +171,10 @@ pub fn tiles(
             }
         })?;
         let made = start.elapsed();
-        let costs =
-            ctx.install(|| Ok(costs(&photos, &picture, source_map.as_ref(), params, wrap)))?;
+        let costs = ctx.install(|| {
+            let map = source_map.as_ref();
+            Ok(costs(&photos, &picture, map, params, inputs.sigma_map, wrap))
+        })?;
         let report = Report {
             version: env!("CARGO_PKG_VERSION"),
             seed,
@@ -353,6 +211,10 @@ fn check(inputs: &Inputs<'_>, params: &TileParams, count: usize) -> Result<(usiz
     }
     if params.patch.is_multiple_of(2) {
         return Err(Error::parameter("patch", "odd, so that a patch has a middle", params.patch));
+    }
+    if params.measure != Measure::Moments && params.order != TileParams::default().order {
+        let expected = "left out unless the measure is `moments`";
+        return Err(Error::parameter("order", expected, params.order));
     }
     let photo = inputs.photo;
     let (width, height) = params.resolved_size(photo.width(), photo.height());
@@ -401,6 +263,13 @@ fn check(inputs: &Inputs<'_>, params: &TileParams, count: usize) -> Result<(usiz
             return Err(Error::parameter("symmetry", expected, params.symmetry.show()));
         }
     }
+    if let Some(map) = inputs.sigma_map {
+        map.ensure_size(height, width)?;
+    }
+    // A filtered channel is eleven planes of floats; a sigma map has up to eight planes of weights.
+    let filtered = if params.measure == Measure::Steerable { 44 } else { 0 };
+    let mapped = if inputs.sigma_map.is_some() { 48 } else { 0 };
+    let measured = (width * height) as u64 * (filtered + mapped);
     // Every tile with its source map stays until the last is made; flattened photos are copies.
     let tile = (width * height) as u64 * (photo.byte_len() / (pw * ph)) as u64;
     let others = (tile + 12 * (width * height) as u64).checked_mul(count as u64 - 1);
@@ -409,7 +278,9 @@ fn check(inputs: &Inputs<'_>, params: &TileParams, count: usize) -> Result<(usiz
     let sizes: Vec<_> = photos.iter().map(|photo| (photo.height(), photo.width())).collect();
     let symmetries = params.symmetry.list();
     let work = stationary::memory_bytes(&sizes, symmetries, (height, width));
-    let need = others.zip(work).and_then(|(others, work)| work.checked_add(tile + flat + others));
+    let need = others
+        .zip(work)
+        .and_then(|(others, work)| work.checked_add(tile + flat + measured + others));
     let what = if count > 1 { format!("{count} tiles of") } else { "a tile of".to_owned() };
     let from = match photos.len() * symmetries.len() {
         1 => format!("a {pw}x{ph} photo"),
@@ -419,8 +290,13 @@ fn check(inputs: &Inputs<'_>, params: &TileParams, count: usize) -> Result<(usiz
     Ok((width, height))
 }
 
-fn plan(params: &TileParams, size: (usize, usize), wrap: Wrap) -> stationary::Plan {
-    let even = params.method == Method::Stationary && params.measure != Measure::None;
+fn plan(
+    params: &TileParams,
+    sigma_map: Option<&SigmaMap>,
+    size: (usize, usize),
+    wrap: Wrap,
+) -> stationary::Plan {
+    let even = params.method == Method::Stationary;
     let wraps = params.method != Method::NoWrap;
     let (coarse_iterations, fine_iterations) = match params.quality {
         Quality::Draft => (12, 1),
@@ -430,9 +306,10 @@ fn plan(params: &TileParams, size: (usize, usize), wrap: Wrap) -> stationary::Pl
     stationary::Plan {
         size,
         wrap: Wrap { y: wrap.y && wraps, x: wrap.x && wraps },
-        sigma: even.then_some(params.sigma),
+        evenness: params.evenness(sigma_map).filter(|_| even),
         patch: params.patch,
         uniformity: params.uniformity,
+        rarity: if even { params.rarity } else { 0.0 },
         coarse_iterations,
         fine_iterations,
     }
@@ -443,6 +320,7 @@ fn costs(
     picture: &Picture,
     map: Option<&SourceMap>,
     params: &TileParams,
+    sigma_map: Option<&SigmaMap>,
     wrap: Wrap,
 ) -> Costs {
     let model = ColorModel::new(photos[0]);
@@ -451,8 +329,14 @@ fn costs(
     let (height, width) = (picture.height(), picture.width());
     let domain = Domain { height, width, wrap_y: wrap.y, wrap_x: wrap.x };
     let sigma = f64::from(params.sigma) * height.min(width) as f64;
+    let stationarity = stationarity::histogram_cost(&pixels, domain, sigma);
+    let by_measure = |evenness: stationary::Evenness| match evenness.statistic {
+        Statistic::Histogram if sigma_map.is_none() => stationarity,
+        other => other.cost(&pixels, domain, &evenness.window((height, width), domain)),
+    };
     Costs {
         texture: map.map(|map| texture::cost_bound(picture, photos, map, params.patch, wrap)),
-        stationarity: stationarity::histogram_cost(&pixels, domain, sigma),
+        stationarity,
+        stationarity_by_measure: params.evenness(sigma_map).map(by_measure),
     }
 }

@@ -4,6 +4,7 @@ mod cli;
 mod golden;
 mod house;
 mod io;
+mod measures;
 mod options;
 mod quality;
 mod search;

@@ -314,6 +314,45 @@ mod likeness {
     }
 }
 
+mod rarity {
+    use super::*;
+
+    /// Grain with eight dark discs of 7 pixels.
+    fn spotted() -> Picture {
+        let mut photo = grain(160, 160, 9);
+        for spot in 0..8 {
+            let at = |axis: i64| 10 + (hash(5, spot, axis) * 140.0) as i64;
+            let (cy, cx) = (at(0), at(1));
+            for (i, px) in photo.rgb.iter_mut().enumerate() {
+                let (y, x) = ((i / 160) as i64 - cy, (i % 160) as i64 - cx);
+                if y * y + x * x <= 12 {
+                    *px = [0.02, 0.02, 0.02];
+                }
+            }
+        }
+        photo.picture()
+    }
+
+    fn dark(picture: &Picture) -> usize {
+        let (h, w) = (picture.height(), picture.width());
+        (0..h * w).filter(|i| light(picture, i / w, i % w) < 0.05).count()
+    }
+
+    /// Dark pixels in the tiles of five seeds fall to a third; the baseline ignores the dial.
+    #[test]
+    fn rarity_holds_specks_back() {
+        let photo = spotted();
+        let count = |method: Method, rarity: f32| -> usize {
+            let params = TileParams { rarity, method, ..normal(96, 96) };
+            (0..5).map(|seed| dark(&made(&photo, seed, &params).picture)).sum()
+        };
+        let (without, with) = (count(Method::Stationary, 0.0), count(Method::Stationary, 1.0));
+        assert!(without > 100, "only {without} dark pixels to hold back");
+        assert!(with * 3 < without, "{with} dark pixels with, {without} without");
+        assert_eq!(count(Method::WrapOnly, 0.0), count(Method::WrapOnly, 1.0));
+    }
+}
+
 mod costs {
     use super::*;
     use texforge::analyze::texture::cost_bound;

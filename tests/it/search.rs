@@ -6,7 +6,8 @@ use texforge::search::field::{Field, Pos};
 use texforge::search::patch::{
     CODE_MAX, Kernel, MatchImage, PATCH_MAX, WithKernel, detected, distance_squared, with_kernel,
 };
-use texforge::search::patchmatch::{self, Search, Usage, Wrap};
+use texforge::search::patchmatch::{self, Search, Wrap};
+use texforge::search::place_cost::PlaceCost;
 use texforge::search::seams::{self, Canvas, From};
 use texforge::search::source::Source;
 use texforge::search::vote::vote;
@@ -263,7 +264,7 @@ mod fields {
     fn passes(
         ctx: &Ctx,
         (target, source): (&MatchImage, &Source),
-        usage: &Usage,
+        usage: &PlaceCost,
         wrap: Wrap,
         n_random: u32,
         which: std::ops::Range<u32>,
@@ -304,7 +305,7 @@ mod fields {
         let source = Source::new(smooth_image(56, 60, 1), PATCH, None).expect("source");
         let (h, w) = (48, 48);
         let target = smooth_image(h + PATCH - 1, w + PATCH - 1, 500);
-        let usage = Usage::free(&source);
+        let usage = PlaceCost::free(&source);
         let ctx = ctx();
         let mut field = random_field(h, w, &source, 1);
         let measured = |field: &Field| patchmatch::distances(ctx.simd, &target, &source, field);
@@ -344,7 +345,7 @@ mod fields {
         });
         let ctx = ctx();
         let mut field = random_field(h, w, &source, 3);
-        let usage = Usage::free(&source);
+        let usage = PlaceCost::free(&source);
         passes(&ctx, (&target, &source), &usage, NONE, 8, 0..6, &mut field);
         let (mut whole, mut found) = (0, 0);
         for y in 0..h {
@@ -383,7 +384,7 @@ mod fields {
             });
             let mut field = random_field(24, 24, &source, 1);
             all_usable(&field, "random");
-            let usage = Usage::of(&field, &source, 100.0);
+            let usage = PlaceCost::of_usage(&field, &source, 100.0);
             passes(&ctx(), (&target, &source), &usage, wrap, 8, 0..6, &mut field);
             all_usable(&field, "searched");
             all_usable(&field.upsampled((31, 31), &source, &source, 1), "upsampled");
@@ -419,7 +420,7 @@ mod fields {
             let pos = (0..h * w).map(|i| if last(i) { right(i) } else { wrong }).collect();
             for wrap in WRAPS {
                 let mut field = Field { height: h, width: w, pos: Vec::clone(&pos) };
-                let usage = Usage::free(&source);
+                let usage = PlaceCost::free(&source);
                 passes(&ctx(), (&target, &source), &usage, wrap, 0, 0..1, &mut field);
                 // Inside the first piece, clear of the other axis' seam.
                 let found = (0..h * w)
@@ -445,7 +446,7 @@ mod fields {
         let crowded = || Field { height: h, width: w, pos: vec![Pos::new(20, 20); h * w] };
         for (weight, stays) in [(0.0, true), (1000.0, false)] {
             let mut field = crowded();
-            let usage = Usage::of(&field, &source, weight);
+            let usage = PlaceCost::of_usage(&field, &source, weight);
             passes(&ctx(), (&target, &source), &usage, NONE, 8, 0..1, &mut field);
             let near =
                 field.pos.iter().filter(|p| p.y().abs_diff(20) < 8 && p.x().abs_diff(20) < 8);
@@ -479,7 +480,7 @@ mod fields {
             let mut ctx = Ctx::new(3, threads).expect("pool");
             ctx.simd = simd;
             let mut field = random_field(70, 60, &source, 3);
-            let usage = Usage::of(&field, &source, 3000.0);
+            let usage = PlaceCost::of_usage(&field, &source, 3000.0);
             passes(&ctx, (&target, &source), &usage, BOTH, 4, 0..5, &mut field);
             field.pos
         };
@@ -499,7 +500,7 @@ mod fields {
         let ctx = ctx();
         ctx.job().cancel();
         let search = Search { pass: 0, radius: 0, n_random: 1 };
-        let usage = Usage::free(&source);
+        let usage = PlaceCost::free(&source);
         let result = patchmatch::pass(&ctx, &target, &source, &usage, NONE, search, &mut field);
         assert!(matches!(result, Err(texforge::Error::Cancelled)), "{result:?}");
     }

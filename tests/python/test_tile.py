@@ -71,6 +71,25 @@ def test_costs_are_finite_and_not_negative(photo: Photo) -> None:
     assert texforge.tile(photo, method="make-seamless", **QUICK).costs.texture is None
 
 
+@pytest.mark.parametrize("measure", ["histogram", "moments", "steerable"])
+def test_each_measure_has_its_cost(photo: Photo, measure: texforge.Measure) -> None:
+    costs = texforge.tile(photo, measure=measure, **QUICK).costs
+    assert costs.stationarity_by_measure is not None
+    assert (costs.stationarity_by_measure == costs.stationarity) == (measure == "histogram")
+    assert texforge.tile(photo, measure="none", **QUICK).costs.stationarity_by_measure is None
+
+
+def test_a_sigma_map_is_heeded_and_must_fit(photo: Photo) -> None:
+    ramp = np.tile(np.linspace(0.02, 0.5, 32, dtype=np.float32), (24, 1))
+    tile = texforge.tile(photo, sigma_map=ramp, **QUICK)
+    assert not np.array_equal(tile.image, texforge.tile(photo, **QUICK).image)
+    with pytest.raises(texforge.PictureError, match="the sigma map is 24x32 pixels"):
+        texforge.tile(photo, sigma_map=ramp.T, **QUICK)
+    ramp[3, 5] = np.nan
+    with pytest.raises(texforge.PictureError, match="the sigma map holds 1 NaN"):
+        texforge.tile(photo, sigma_map=ramp, **QUICK)
+
+
 @given(seed=st.integers(0, 1000), share=st.floats(0.2, 0.9))
 def test_no_masked_pixel_is_used(seed: int, share: float) -> None:
     photo = noise(40, 50)

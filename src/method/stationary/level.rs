@@ -12,10 +12,13 @@ use rayon::prelude::*;
 use crate::search::atlas::Atlas;
 use crate::search::field::Pos;
 use crate::search::patch::{CODE_MAX, MatchImage};
+use crate::search::place_cost::PlaceCost;
+use crate::search::rarity::rarity;
 use crate::search::source::Source;
 use crate::signal::histogram::{Distribution, Quantiles, SOFT_BITS, Soft};
-use crate::signal::localhist::{Domain, LocalDistributions};
+use crate::signal::localhist::LocalDistributions;
 use crate::signal::resample::{resized, resized_mask};
+use crate::signal::window::Domain;
 
 /// Ratio of the sides of two neighbouring levels (the paper's).
 const RATIO: f64 = 1.3;
@@ -33,6 +36,10 @@ const TYPICAL_WINDOW: f64 = 0.15;
 /// Cost of using a patch as often as the average, as a share of the patch's own variance. More
 /// drives neighbouring pixels to different places of the photo, and the vote blurs.
 const USAGE_SHARE: f64 = 0.024;
+
+/// Shorter side of the largest level at which rare places are looked for. A patch then spans a
+/// twentieth of the photo; what is smaller than a tenth of a patch here, nobody notices in a tile.
+const RARITY_SIDE: usize = 256;
 
 /// Affine map from L*a*b* to 7-bit codes, the same scale for all channels, so that distances of
 /// codes are Euclidean distances of colours.
@@ -84,6 +91,10 @@ impl Codes {
     }
 }
 
+/// How many pixels have each code, per channel.
+type Counts = [[u32; CODE_MAX as usize + 1]; 4];
+const NOTHING: Counts = [[0; CODE_MAX as usize + 1]; 4];
+
 /// One level of the pyramid.
 #[derive(Debug)]
 pub(super) struct Level {
@@ -97,6 +108,8 @@ pub(super) struct Level {
     pub(super) usage_unit: f32,
     /// The mean squared distance of a patch from the mean colour, in squared codes.
     pub(super) patch_variance: f64,
+    /// What rare places cost.
+    pub(super) rarity: PlaceCost,
 }
 
 /// A photo, as far as the pyramid has reduced it.
@@ -171,7 +184,7 @@ pub(super) fn build(
         }
     }
     // Only the coarsest level matches colours; without projection it is the paper's plain target.
-    if let (Some(coarsest), true) = (levels.last_mut(), plan.sigma.is_some()) {
+    if let (Some(coarsest), true) = (levels.last_mut(), plan.evenness.is_some()) {
         for (quantiles, typical) in
             coarsest.quantiles.iter_mut().zip(typical_quantiles(&coarsest.source))
         {
@@ -180,7 +193,25 @@ pub(super) fn build(
             }
         }
     }
+    if plan.rarity > 0.0 {
+        rate(ctx, &mut levels);
+    }
     Ok((levels, finest_usable))
+}
+
+/// Finds what is rare at the coarse levels; the finer ones take it over.
+fn rate(ctx: &Ctx, levels: &mut [Level]) {
+    for j in (0..levels.len()).rev() {
+        let (fine, coarse) = levels.split_at_mut(j + 1);
+        let level = &mut fine[j];
+        let side = level.source.rows().min(level.source.cols());
+        level.rarity = match coarse.first() {
+            Some(coarser) if side > RARITY_SIDE => {
+                coarser.rarity.resized(&coarser.source, &level.source)
+            }
+            _ => rarity(ctx, &level.source),
+        };
+    }
 }
 
 /// A level, and where its source may be used.
@@ -215,14 +246,29 @@ fn level(
     let (eh, ew) = (atlas.height(), atlas.width());
     let source = Source::of_atlas(image, patch, usable, atlas)?;
     let usable_pixel = |i: &usize| usable.is_none_or(|u| u[*i]);
-    let masses: [Vec<f64>; 4] = std::array::from_fn(|k| {
-        let mut masses = vec![0.0; CODE_MAX as usize + 1];
-        let code = |i: usize| source.image.pixel(i / ew, i % ew)[k] as usize;
-        // An odd step visits every column of a picture of even width.
-        let step = (eh * ew / 400_000) | 1;
-        (0..eh * ew).step_by(step).filter(usable_pixel).for_each(|i| masses[code(i)] += 1.0);
-        masses
-    });
+    // An odd step visits every column of a picture of even width.
+    let step = (eh * ew / 400_000) | 1;
+    let count = |mut counts: Counts, sample: usize| {
+        let i = sample * step;
+        if usable_pixel(&i) {
+            let px = source.image.pixel(i / ew, i % ew);
+            counts.iter_mut().zip(px).for_each(|(counts, code)| counts[code as usize] += 1);
+        }
+        counts
+    };
+    let masses = (0..(eh * ew).div_ceil(step))
+        .into_par_iter()
+        .with_min_len(1 << 14)
+        .fold(|| NOTHING, count)
+        .reduce(
+            || NOTHING,
+            |mut a, b| {
+                let all = a.as_flattened_mut().iter_mut().zip(b.as_flattened());
+                all.for_each(|(a, b)| *a += b);
+                a
+            },
+        )
+        .map(|counts| counts.map(f64::from).to_vec());
     // If the step has missed the few usable pixels, any usable patch's first pixel will do.
     let distribution = |k: usize| {
         Distribution::from_masses(&masses[k]).unwrap_or_else(|| {
@@ -244,7 +290,8 @@ fn level(
         .sum();
     let patch_variance = variance * (patch * patch) as f64;
     let usage_unit = (USAGE_SHARE * variance * (patch * patch) as f64) as f32;
-    Some((Level { size, source, quantiles, usage_unit, patch_variance }, flags))
+    let rarity = PlaceCost::free(&source);
+    Some((Level { size, source, quantiles, usage_unit, patch_variance, rarity }, flags))
 }
 
 /// The exemplar's typical local histogram of each colour: the median over all places of a photo of
@@ -272,7 +319,8 @@ fn typical_quantiles(source: &Source) -> [Option<Quantiles>; CONTRAST] {
         let sigma = TYPICAL_WINDOW * height.min(width) as f64;
         let weight = usable.iter().filter(|&&ok| ok).count() as f64;
         for (k, all) in all.iter_mut().enumerate() {
-            let local = LocalDistributions::new(&soft, Some(&usable), k, domain, sigma);
+            let code = |i: usize| usable[i].then_some(soft[i][k]);
+            let local = LocalDistributions::new(code, domain, sigma);
             all.extend(local.typical().map(|typical| (typical, weight)));
         }
     }

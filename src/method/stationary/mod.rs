@@ -12,16 +12,20 @@ use crate::base::ctx::Ctx;
 use crate::base::error::Result;
 use crate::image::mask::Mask;
 use crate::image::picture::Picture;
+use crate::image::sigma_map::SigmaMap;
 use crate::image::sourcemap::{Origin, SourceMap};
 use crate::image::symmetry::Symmetry;
 use crate::search::atlas::Atlas;
 use crate::search::field::{Field, Pos};
 use crate::search::patch::MatchImage;
-use crate::search::patchmatch::{self, Search, Usage, Wrap};
+use crate::search::patchmatch::{self, Search, Wrap};
+use crate::search::place_cost::PlaceCost;
 use crate::search::seams;
 use crate::search::vote::{Votes, vote};
 use crate::signal::histogram::{Distribution, SOFT_BITS};
-use crate::signal::localhist::{self, Domain};
+use crate::signal::measure::Statistic;
+use crate::signal::resample::resized;
+use crate::signal::window::{Domain, Window};
 
 use balance::Balance;
 use level::Level;
@@ -49,17 +53,49 @@ pub struct Plan {
     pub size: (usize, usize),
     /// Which axes wrap.
     pub wrap: Wrap,
-    /// Standard deviation of the stationarity window as a fraction of the shorter side; `None`
-    /// leaves the projection out.
-    pub sigma: Option<f32>,
+    /// What is made equal everywhere; `None` leaves the projection out.
+    pub evenness: Option<Evenness>,
     /// Patch side.
     pub patch: usize,
     /// Weight of spatial uniformity.
     pub uniformity: f32,
+    /// How much rare places cost, as a share of what they are rarer than others.
+    pub rarity: f32,
     /// Iterations at the coarsest level.
     pub coarse_iterations: u32,
     /// Iterations at each other level.
     pub fine_iterations: u32,
+}
+
+/// What is made equal everywhere, and within which reach.
+#[derive(Debug, Clone)]
+pub struct Evenness {
+    /// The statistic.
+    pub statistic: Statistic,
+    /// Standard deviation of its window as a fraction of the output's shorter side.
+    pub sigma: f32,
+    /// The same for every pixel of the output, in place of `sigma`.
+    pub sigma_map: Option<SigmaMap>,
+}
+
+impl Evenness {
+    /// The window at an output of this size, over a domain that may have an apron around it.
+    pub fn window(&self, (height, width): (usize, usize), domain: Domain) -> Window {
+        let side = height.min(width) as f32;
+        let Some(map) = &self.sigma_map else {
+            return Window::even(f64::from(self.sigma) * f64::from(side));
+        };
+        let gray: Vec<[f32; 3]> = map.values().iter().map(|&v| [v; 3]).collect();
+        let small = resized(&gray, map.size(), (height, width));
+        // What the map does not reach is like its edge.
+        let inside = |i: usize, n: usize, all: usize| i.saturating_sub((all - n) / 2).min(n - 1);
+        let at = |i: usize| {
+            let y = inside(i / domain.width, height, domain.height);
+            small[y * width + inside(i % domain.width, width, domain.width)][0] * side
+        };
+        let sigmas: Vec<f32> = (0..domain.height * domain.width).map(at).collect();
+        Window::prescribed(&sigmas)
+    }
 }
 
 /// Photos, analysed: what all runs on them share.
@@ -118,9 +154,17 @@ pub fn run(ctx: &Ctx, exemplar: &Exemplar, plan: &Plan) -> Result<SourceMap> {
             Some(field) => field.upsampled((h, w), &levels[j + 1].source, &level.source, ctx.seed),
         };
         let coarsest = j == n_coarse;
-        let mut usage = Usage::of(&f, &level.source, plan.uniformity * level.usage_unit);
+        let mut usage = PlaceCost::of_usage(&f, &level.source, plan.uniformity * level.usage_unit);
         let areas = balance::areas(&level.source, exemplar.sizes.len());
         let (iterations, search) = effort(plan, level, coarsest);
+        let apron = |wrap: bool| if wrap { 0 } else { plan.patch - 1 };
+        let domain = Domain {
+            height: h + apron(plan.wrap.y),
+            width: w + apron(plan.wrap.x),
+            wrap_y: plan.wrap.y,
+            wrap_x: plan.wrap.x,
+        };
+        let window = plan.evenness.as_ref().map(|e| (e, e.window((h, w), domain)));
         for i in 0..iterations {
             let mut votes = vote(ctx.simd, &f, &level.source, plan.wrap);
             let fade = 1.0 - (i + 1) as f32 / iterations as f32;
@@ -132,21 +176,20 @@ pub fn run(ctx: &Ctx, exemplar: &Exemplar, plan: &Plan) -> Result<SourceMap> {
             } else {
                 FINE_PROJECTION
             };
-            if let Some(sigma) = plan.sigma.filter(|_| projection > 0.0) {
-                let (height, width) = (votes.height, votes.width);
-                let domain = Domain { height, width, wrap_y: plan.wrap.y, wrap_x: plan.wrap.x };
-                let sigma = sigma as f64 * h.min(w) as f64;
-                localhist::project(&mut votes.soft, domain, sigma, projection);
+            if let Some((evenness, window)) = window.as_ref().filter(|_| projection > 0.0) {
+                evenness.statistic.project(&mut votes.soft, domain, window, projection);
             }
             let target = canvas(&votes, plan, (h, w));
-            let now = Usage::of(&f, &level.source, plan.uniformity * level.usage_unit);
+            let now = PlaceCost::of_usage(&f, &level.source, plan.uniformity * level.usage_unit);
             usage = now.averaged(&usage);
+            let cost = usage.clone().plus(plan.rarity, &level.rarity);
             let search = Search { pass, ..search };
             let unit = f64::from(plan.uniformity) * level.patch_variance;
-            let costs = balance.costs(&f, &level.source, &areas, unit);
-            let balanced = costs.map(|c| usage.clone().with_picture_costs(&level.source, &c));
-            let usage = balanced.as_ref().unwrap_or(&usage);
-            patchmatch::pass(ctx, &target, &level.source, usage, plan.wrap, search, &mut f)?;
+            let cost = match balance.costs(&f, &level.source, &areas, unit) {
+                Some(costs) => cost.with_picture_costs(&level.source, &costs),
+                None => cost,
+            };
+            patchmatch::pass(ctx, &target, &level.source, &cost, plan.wrap, search, &mut f)?;
             pass += 1;
         }
         field = Some(f);
@@ -200,20 +243,17 @@ pub fn memory_bytes(
     // Per photo pixel: linear light of this level and the next (12 + 7).
     const PHOTO: u64 = 19;
     // Per atlas pixel: codes with and without contrast (8), sums of squares and norms of all levels
-    // (4 + 8 * 2.45 / 2).
+    // (4 + 8 * 2.45 / 2). With several views, codes of all levels (4 * 2.45), and what is usable, flag
+    // by flag (1 + 2.45) and as a list (4 * 2.45).
     const ATLAS: u64 = 25;
-    // The same where views are copied side by side: also each photo's own codes (4), and what is
-    // usable, flag by flag (2 + 2.45) and as a list (4 * 2.45).
-    const VIEWS: u64 = 19;
     // Per output pixel: two fields (8), votes (8), canvas (4), three source maps (24), or the costs'
     // colours (20).
     const OUTPUT: u64 = 48;
     let atlas = Atlas::new(photos, symmetries)?;
     let pixels = |(h, w): (usize, usize)| h as u64 * w as u64;
-    let each = if atlas.is_plain() { ATLAS } else { ATLAS + VIEWS };
     let photos: u64 = photos.iter().map(|&photo| pixels(photo)).sum();
     let atlas = pixels((atlas.height(), atlas.width()));
-    Some((PHOTO * photos + each * atlas + OUTPUT * pixels(output)) / 4 * 5)
+    Some((PHOTO * photos + ATLAS * atlas + OUTPUT * pixels(output)) / 4 * 5)
 }
 
 /// Picks what to do at a level: iterations, and how far to search.
