@@ -132,13 +132,13 @@ def picture(image: Any, what: str, encoding: str = "auto") -> Picture:
     return Picture(whole, encoding, flat, isinstance(image, Image), notes)
 
 
-def mask(mask: Any) -> Picture:
-    """Return a mask ready for the core: white or True is usable."""
+def mask(mask: Any, what: str = "the mask") -> Picture:
+    """Return a mask ready for the core: white or True is set."""
     if not hasattr(mask, "mode"):
-        array = _from_any(mask, "the mask")
+        array = _from_any(mask, what)
         if array.dtype == np.bool_:
             mask = array.astype(np.uint8) * np.uint8(255)
-    return picture(mask, "the mask", "srgb")
+    return picture(mask, what, "srgb")
 
 
 def positions(source_map: Any) -> npt.NDArray[np.int32]:
