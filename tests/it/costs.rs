@@ -270,9 +270,9 @@ mod trace {
                 assert!(off.report.seconds.iter().all(|(stage, _)| *stage != "trace"));
                 let last = on.trace.last().expect("steps");
                 assert_eq!(last.costs, on.report.costs, "{method:?}, {axis:?}");
-                // 64, 49, 38 pixels; 12 iterations at the coarsest level, 1 at each other.
+                // 64, 49, 38 pixels; 20 iterations at the coarsest level, 1 at each other.
                 let steps: Vec<_> = on.trace.iter().map(|s| (s.level, s.iteration)).collect();
-                let coarsest = (1..=12).map(|i| (2, i));
+                let coarsest = (1..=20).map(|i| (2, i));
                 let expected: Vec<_> = coarsest.chain([(1, 1), (0, 1), (0, 2)]).collect();
                 assert_eq!(steps, expected, "{method:?}");
             }
