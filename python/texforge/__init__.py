@@ -49,8 +49,8 @@ from texforge._types import (
     Quality,
     SourceMap,
     Step,
-    TextureCost,
     Symmetries,
+    TextureCost,
     Tile,
     TileOptions,
 )

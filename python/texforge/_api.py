@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from texforge import _arrays, _texforge
-from texforge._errors import ParameterError, PictureError
+from texforge._errors import ParameterError
 from texforge._progress import reporting
 from texforge._types import (
     Axis,
@@ -367,7 +367,7 @@ def apply(
             source_size = (other.array.shape[0], other.array.shape[1])
         source_map = SourceMap(_arrays.positions(source_map), source_size)
     out = _texforge.apply(
-        source_map=_packed_map(source_map),
+        source_map=_arrays.packed_map(source_map),
         pictures=[one.packed() for one in (other, *further)],
         kind=_arrays.word("kind", kind),
     )
@@ -487,7 +487,9 @@ def save_source_map(tile: Tile, path: PathType, *, overwrite: bool) -> None:
     """See `Tile.save_source_map`."""
     source_map = _source_map_of(tile)
     _texforge.write_source_map(
-        path=_arrays.path(path), source_map=_packed_map(source_map), overwrite=bool(overwrite)
+        path=_arrays.path(path),
+        source_map=_arrays.packed_map(source_map),
+        overwrite=bool(overwrite),
     )
 
 
@@ -570,32 +572,6 @@ def _origins(parts: Any) -> npt.NDArray[np.int32] | None:
     if origins is None:
         return None
     return np.frombuffer(origins, dtype=np.int32).reshape(height, width, 2)
-
-
-def _packed_map(source_map: SourceMap) -> tuple[Any, tuple[int, int], list[tuple[int, int]], Any]:
-    positions = _arrays.positions(source_map.positions)
-    sizes = []
-    all_sizes: tuple[object, ...] = (source_map.source_size, *source_map.further_sizes)
-    for size in all_sizes:
-        if not isinstance(size, tuple | list) or len(size) != 2:
-            raise ParameterError(
-                f"`source_size` must be (height, width), got {size!r}",
-                fields={"name": "source_size"},
-            )
-        height, width = (_arrays.integer("source_size", side, 1, 2**31) for side in size)
-        sizes.append((height, width))
-    origins = source_map.origins
-    if origins is not None:
-        origins = _arrays.positions(origins)
-        if origins.shape != positions.shape:
-            raise PictureError(
-                f"the source map has positions of shape {positions.shape} and origins of shape "
-                f"{origins.shape}; they must be the same",
-                fields={"what": "the source map"},
-            )
-        origins = origins.reshape(-1).view(np.uint8)
-    shape = (positions.shape[0], positions.shape[1])
-    return positions.reshape(-1).view(np.uint8), shape, sizes, origins
 
 
 def _size_text(size: object) -> str:

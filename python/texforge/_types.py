@@ -28,8 +28,8 @@ __all__ = [
     "Quality",
     "SourceMap",
     "Step",
-    "TextureCost",
     "Symmetries",
+    "TextureCost",
     "Tile",
     "TileOptions",
 ]
