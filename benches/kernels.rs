@@ -326,6 +326,7 @@ fn settling(bench: &mut Bench, ctx: &Ctx) {
         source: &scene.source.image,
         atlas: &scene.source.atlas,
         usable: None,
+        fixed: None,
         target: &target,
         wrap: scene.wrap,
     };

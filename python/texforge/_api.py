@@ -54,6 +54,7 @@ def tile(
     avoid_grow: int = 0,
     flatten: float = 0.0,
     symmetry: Symmetries = "none",
+    band: int = 0,
     seed: int = 0,
     also: Sequence[ImageLike] | None = None,
     mask: ImageLike | None = None,
@@ -115,6 +116,10 @@ def tile(
         Whether patches of the photo are also used mirrored left to right, turned by quarters, or
         both: more to choose from, but light then falls from several sides. Time and memory grow
         with it, up to eight photos'.
+    band : int
+        Width of the border that is made anew, in pixels, so that the photo repeats; its middle
+        stays as it is, pixel for pixel. At least `patch`; 0 makes all anew. The tile then is as
+        large as the photo, unless `size` cuts out its middle.
     seed : int
         Seed of all random choices, 0 to 2**64 - 1.
     also : sequence of array_like or Pillow images, optional

@@ -97,6 +97,7 @@ class TileOptions(TypedDict, total=False):
     avoid_grow: int
     flatten: float
     symmetry: Symmetries
+    band: int
     seed: int
     also: Sequence[ImageLike] | None
     mask: ImageLike | None

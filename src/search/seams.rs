@@ -22,6 +22,8 @@ pub struct Canvas<'a> {
     pub atlas: &'a Atlas,
     /// Where it may be used (`None`: everywhere).
     pub usable: Option<&'a [bool]>,
+    /// Output pixels that stay as they are (`None`: none).
+    pub fixed: Option<&'a [bool]>,
     /// The voted output (codes), `height` x `width`.
     pub target: &'a MatchImage,
     /// Which axes of the output wrap.
@@ -58,7 +60,8 @@ pub fn settle(ctx: &Ctx, canvas: &Canvas<'_>, from: &mut [From], sweeps: u32) ->
                     && is(below, 1)
             };
             for x in ((y + sweep as usize) % 2..w).step_by(2) {
-                if !inside(x) {
+                let fixed = canvas.fixed.is_some_and(|fixed| fixed[y * w + x]);
+                if !fixed && !inside(x) {
                     row[x] = canvas.best(from, h, w, y, x);
                 }
             }

@@ -153,6 +153,8 @@ params! {
         flatten: f32 = 0.0, in 0.0..=1.0, unit "fraction of the photo's shorter side";
         /// Whether patches are also used mirrored left to right, turned by quarters, or both: more to choose from, but light then falls from several sides.
         symmetry: Symmetries = Symmetries::None;
+        /// Keep the photo's middle as it is, pixel for pixel, and make only a border of this width anew, so that it repeats; 0 makes all anew.
+        band: usize = 0, in 0..=8192, unit "px";
     }
 }
 
@@ -163,7 +165,7 @@ impl TileParams {
         if let Size::Pixels { width, height } = self.size {
             return (width, height);
         }
-        if self.method == Method::MakeSeamless {
+        if self.method == Method::MakeSeamless || self.band > 0 {
             return (photo_width, photo_height);
         }
         let pow2 = |n: usize| (1 << (n.max(1) * 11 / 10).max(1).ilog2()).min(2048);

@@ -16,7 +16,7 @@ use crate::image::picture::Picture;
 use crate::image::sigma_map::SigmaMap;
 use crate::image::sourcemap::SourceMap;
 use crate::method::make_seamless;
-use crate::method::stationary::{self, Exemplar};
+use crate::method::stationary::{self, Exemplar, Kept};
 use crate::search::patchmatch::Wrap;
 use crate::signal::measure::Statistic;
 use crate::signal::window::Domain;
@@ -163,7 +163,12 @@ pub fn tiles(
     {
         notes.push("nothing is made stationary; the sigma map changes no pixel".to_owned());
     }
-    let plan = plan(params, inputs.sigma_map, (height, width), wrap);
+    let mut plan = plan(params, inputs.sigma_map, (height, width), wrap);
+    if params.band > 0 {
+        let photo = (inputs.photo.height(), inputs.photo.width());
+        let usable = masks[0].as_ref().map(Mask::usable);
+        plan.kept = Some(Kept::middle(photo, usable, (height, width), params.band, wrap));
+    }
     let (flat, exemplar) = ctx.install(|| {
         let flat = inputs.flattened(&masks, params, &mut notes)?;
         if params.method == Method::MakeSeamless {
@@ -279,6 +284,9 @@ fn check(inputs: &Inputs<'_>, params: &TileParams, count: usize) -> Result<(usiz
             "choose a smaller patch or a larger size",
         ));
     }
+    if params.band > 0 {
+        check_band(params, (pw, ph), (width, height))?;
+    }
     let photos = inputs.photos(None);
     for (i, photo) in photos.iter().enumerate() {
         let what = if i == 0 { "the photo".to_owned() } else { format!("photo {}", i + 1) };
@@ -325,6 +333,36 @@ fn check(inputs: &Inputs<'_>, params: &TileParams, count: usize) -> Result<(usiz
     Ok((width, height))
 }
 
+/// Checks that a border of `params.band` pixels leaves a middle that the photo has.
+fn check_band(
+    params: &TileParams,
+    (photo_width, photo_height): (usize, usize),
+    (width, height): (usize, usize),
+) -> Result<()> {
+    if !matches!(params.method, Method::Stationary | Method::WrapOnly) {
+        let expected = "0 unless the method is stationary or wrap-only";
+        return Err(Error::parameter("band", expected, params.band));
+    }
+    if width > photo_width || height > photo_height {
+        let expected = format!("at most the photo's {photo_width}x{photo_height} with a band");
+        return Err(Error::parameter("size", expected, format!("{width}x{height}")));
+    }
+    let side = match params.axis {
+        Axis::Both => width.min(height),
+        Axis::X => width,
+        Axis::Y => height,
+    };
+    let most = side.saturating_sub(1) / 2;
+    if params.band < params.patch || params.band > most {
+        let least = params.patch;
+        let expected = format!(
+            "{least} (the patch side) to {most}, which leaves a middle of {width}x{height}"
+        );
+        return Err(Error::parameter("band", expected, params.band));
+    }
+    Ok(())
+}
+
 fn plan(
     params: &TileParams,
     sigma_map: Option<&SigmaMap>,
@@ -345,6 +383,7 @@ fn plan(
         patch: params.patch,
         uniformity: params.uniformity,
         rarity: if even { params.rarity } else { 0.0 },
+        kept: None,
         coarse_iterations,
         fine_iterations,
     }

@@ -327,6 +327,7 @@ mod trace {
             uniformity: params.uniformity,
             rarity: params.rarity,
             coarse_iterations: 20,
+            kept: None,
             fine_iterations: 1,
         };
         let mut seen = Vec::new();
@@ -381,6 +382,7 @@ mod trace {
             uniformity: 1.0,
             rarity: 0.0,
             coarse_iterations: 5,
+            kept: None,
             fine_iterations: 1,
         };
         let mut looks = 0;

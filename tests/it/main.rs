@@ -1,5 +1,6 @@
 //! The one integration test binary; a module per subject.
 
+mod band;
 mod cli;
 mod costs;
 mod golden;

@@ -587,6 +587,7 @@ mod settling {
                 source: &source,
                 atlas: &atlas,
                 usable: Some(&usable),
+                fixed: None,
                 target: &target,
                 wrap,
             };
@@ -614,8 +615,14 @@ mod settling {
         let source = random_image(50, 50, 1);
         let atlas = Atlas::plain(source.height(), source.width());
         let target = random_image(21, 30, 2);
-        let canvas =
-            Canvas { source: &source, atlas: &atlas, usable: None, target: &target, wrap: NONE };
+        let canvas = Canvas {
+            source: &source,
+            atlas: &atlas,
+            usable: None,
+            fixed: None,
+            target: &target,
+            wrap: NONE,
+        };
         let whole: Vec<From> = (0..21 * 30).map(|i| [i / 30 + 11, i % 30 + 20]).collect();
         let mut from = whole.clone();
         seams::settle(&ctx(), &canvas, &mut from, 3).expect("settles");
@@ -627,8 +634,14 @@ mod settling {
         let source = smooth_image(40, 36, 4);
         let atlas = Atlas::plain(source.height(), source.width());
         let target = smooth_image(33, 25, 300);
-        let canvas =
-            Canvas { source: &source, atlas: &atlas, usable: None, target: &target, wrap: BOTH };
+        let canvas = Canvas {
+            source: &source,
+            atlas: &atlas,
+            usable: None,
+            fixed: None,
+            target: &target,
+            wrap: BOTH,
+        };
         let run = |threads: usize| {
             let ctx = Ctx::new(0, threads).expect("pool");
             let mut from = pieces(33, 25, &[true; 40 * 36], (40, 36));

@@ -75,6 +75,7 @@ PARAMETERS: dict[str, dict[str, Any]] = {
     "sigma text": {"sigma": "wide"},
     "uniformity": {"uniformity": -1},
     "rarity": {"rarity": 5},
+    "band": {"band": 3},
     "method": {"method": "magic"},
     "measure": {"measure": 3},
     "order zero": {"measure": "moments", "order": 0},

@@ -4,6 +4,7 @@
 //! same loop without wrap or without projection gives the baselines.
 
 mod balance;
+mod kept;
 mod level;
 
 use rayon::prelude::*;
@@ -28,6 +29,7 @@ use crate::signal::resample::resized;
 use crate::signal::window::{Domain, Window};
 
 use balance::Balance;
+pub use kept::Kept;
 use level::Level;
 
 /// Channel that holds local contrast; the three before it are the colour.
@@ -61,6 +63,8 @@ pub struct Plan {
     pub uniformity: f32,
     /// How much rare places cost, as a share of what they are rarer than others.
     pub rarity: f32,
+    /// Output pixels that are given.
+    pub kept: Option<Kept>,
     /// Iterations at the coarsest level.
     pub coarse_iterations: u32,
     /// Iterations at each other level.
@@ -175,6 +179,10 @@ pub fn run(
             None => Field::random(h, w, &level.source, ctx.seed),
             Some(field) => field.upsampled((h, w), &levels[j + 1].source, &level.source, ctx.seed),
         };
+        let kept = plan.kept.as_ref().map(|kept| kept.at_level((h, w), &level.source));
+        if let Some(kept) = &kept {
+            kept.hold(&mut f, &level.source);
+        }
         let coarsest = j == n_coarse;
         let mut usage = PlaceCost::of_usage(&f, &level.source, plan.uniformity * level.usage_unit);
         let areas = balance::areas(&level.source, exemplar.sizes.len());
@@ -201,6 +209,9 @@ pub fn run(
             if let Some((evenness, window)) = window.as_ref().filter(|_| projection > 0.0) {
                 evenness.statistic.project(&mut votes.soft, domain, window, projection);
             }
+            if let Some(kept) = &kept {
+                kept.restore(&mut votes, &level.source, plan.wrap);
+            }
             let target = canvas(&votes, plan, (h, w));
             let now = PlaceCost::of_usage(&f, &level.source, plan.uniformity * level.usage_unit);
             usage = now.averaged(&usage);
@@ -212,6 +223,9 @@ pub fn run(
                 None => cost,
             };
             patchmatch::pass(ctx, &target, &level.source, &cost, plan.wrap, search, &mut f)?;
+            if let Some(kept) = &kept {
+                kept.hold(&mut f, &level.source);
+            }
             pass += 1;
             if let Some(watch) = watch.as_mut() {
                 let sizes: Vec<_> = level.photos.iter().map(|p| (p.height(), p.width())).collect();
@@ -224,11 +238,17 @@ pub fn run(
     let field = field.expect("there is at least one level");
     let finest = &levels[0];
     let mut yx = centers(&field, plan.patch);
-    let votes = vote(ctx.simd, &field, &finest.source, plan.wrap);
+    let mut votes = vote(ctx.simd, &field, &finest.source, plan.wrap);
+    let kept = plan.kept.as_ref().map(|kept| kept.at_level(plan.size, &finest.source));
+    if let Some(kept) = &kept {
+        kept.restore(&mut votes, &finest.source, plan.wrap);
+    }
+    let fixed = kept.as_ref().map(|kept| kept.place(&mut yx));
     let canvas = seams::Canvas {
         source: &finest.source.image,
         atlas: &finest.source.atlas,
         usable: exemplar.usable.as_deref(),
+        fixed: fixed.as_deref(),
         target: &without_apron(&votes, plan, plan.size),
         wrap: plan.wrap,
     };
