@@ -99,7 +99,7 @@ def test_every_row_is_what_tile_and_texture_cost_say(photos: Path, done: texforg
                 sizes = ("44", "50", "1", "16", "16", "0.1", "11", "30")
                 expected.append((*run, *map(repr, values), *sizes, texforge.__version__))
                 assert [(s.iteration, s.level) for s in tile.trace] == [
-                    (i, 0) for i in range(1, 32)
+                    (i, 0) for i in range(1, 62)
                 ]
                 expected_steps += [
                     (*run, str(i), "0", *map(repr, (s.texture, s.stationarity)))
