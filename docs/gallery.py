@@ -96,6 +96,21 @@ def row(path: Path, out: Path, seed: int, side: int, page: Page) -> list[contact
     return cells
 
 
+def gradient_of_sigma(path: Path, seed: int, side: int) -> list[contact.Cell]:
+    """Tile one photograph with a reach that grows from left to right (the paper's Fig. 10)."""
+    photo = photos.reduced(texforge.read_image(path), side)
+    side = min(side, *photo.shape[:2])
+    ramp = np.geomspace(0.02, 0.6, side, dtype=np.float32)
+    cells: list[contact.Cell] = []
+    for label, sigma_map in (
+        ("sigma 0.1", None),
+        ("sigma 0.02 (left) to 0.6 (right)", np.tile(ramp, (side, 1))),
+    ):
+        tile = texforge.tile(photo, size=side, seed=seed, axis="y", sigma_map=sigma_map)
+        cells.append((f"{path.name}: {label}", contact.shown(tile.image, tile.encoding)))
+    return cells
+
+
 def write_index(out: Path, pages: list[Page]) -> None:
     """Write the page that shows all sheets and numbers."""
     head = ["photo", "method", "seed", "texture", "stationarity", "sharpness", "seconds"]
@@ -126,6 +141,7 @@ def main() -> int:
     parser.add_argument("--class", dest="classes", nargs="+", default=[], help="only these")
     parser.add_argument("--only", default="", help="part of the path that must match")
     parser.add_argument("--size", type=int, default=384, help="side of a tile, at most")
+    parser.add_argument("--gradients", action="store_true", help="also sigma growing to the right")
     parser.add_argument("--seeds", type=int, nargs="+", default=[0])
     arguments = parser.parse_args()
     folder: Path = arguments.folder
@@ -146,6 +162,9 @@ def main() -> int:
                 except (texforge.TexforgeError, ValueError, OSError) as error:
                     page.failures.append(f"{path.name}, seed {seed}: {error}")
                     print(f"{path}: failed: {error}", file=sys.stderr, flush=True)
+        if arguments.gradients:
+            found = [gradient_of_sigma(path, arguments.seeds[0], arguments.size) for path in paths]
+            contact.sheet(found).save(arguments.out / f"{name}_gradients.png")
         if rows:
             page.sheet = f"{name}.png"
             contact.sheet(rows).save(arguments.out / page.sheet)
