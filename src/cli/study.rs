@@ -80,7 +80,7 @@ pub(super) fn command() -> Command {
         )
         .before_help(EXAMPLES)
         .arg(
-            args::file("folder", "FOLDER", "The photos: every picture in it and in its folders")
+            args::file("folder", "FOLDER", "The photos: every picture in it and in its folders. What cannot be read is named and left out; the exit status then is 1")
                 .required(true),
         )
         .arg(
