@@ -15,6 +15,7 @@ Prints a table and the medians, in Markdown.
 from __future__ import annotations
 
 import argparse
+import json
 import statistics
 import sys
 from pathlib import Path
@@ -94,13 +95,13 @@ def largest_region(same: npt.NDArray[np.bool_]) -> int:
     return best
 
 
-def measured(path: Path, side: int, seed: int) -> list[float]:
-    """Return the numbers of one photograph."""
+def measured(path: Path, side: int, seed: int, options: dict[str, Any]) -> list[float]:
+    """Return the numbers of one photograph; the options are for the stationary tile alone."""
     photo = photos.reduced(texforge.read_image(path), side)
     side = min(side, *photo.shape[:2])
     tiles = [
-        texforge.tile(photo, size=side, method=method, seed=seed)
-        for method in ("wrap-only", "stationary")
+        texforge.tile(photo, size=side, seed=seed, method="wrap-only"),
+        texforge.tile(photo, size=side, seed=seed, **options),
     ]
     baseline, ours = (tile.costs for tile in tiles)
     if baseline.texture is None or ours.texture is None:
@@ -135,11 +136,14 @@ def main() -> int:
     parser.add_argument("--class", dest="classes", nargs="+", default=[], help="only these")
     parser.add_argument("--only", default="", help="part of the path that must match")
     parser.add_argument("--size", type=int, default=512, help="side of a tile, at most")
+    parser.add_argument("--set", nargs="+", default=[], metavar="NAME=VALUE", help="tile options")
     parser.add_argument("--seeds", type=int, nargs="+", default=[0])
     arguments = parser.parse_args()
     if not arguments.folder.is_dir():
         print(f"quality: skipped, there is no folder {arguments.folder}")
         return 0
+    options = dict(pair.split("=", 1) for pair in arguments.set)
+    options = {name: json.loads(value) for name, value in options.items()}
     failed = False
     for name, paths in photos.by_class(arguments.folder, arguments.classes, arguments.only).items():
         print(f"\n{name}, tiles of {arguments.size} pixels\n")
@@ -148,7 +152,7 @@ def main() -> int:
         for path in paths:
             for seed in arguments.seeds:
                 try:
-                    rows.append(measured(path, arguments.size, seed))
+                    rows.append(measured(path, arguments.size, seed, options))
                 except (texforge.TexforgeError, ValueError, OSError) as error:
                     print(f"{path}: failed: {error}", file=sys.stderr, flush=True)
                     failed = True
