@@ -322,8 +322,13 @@ fn settling(bench: &mut Bench, ctx: &Ctx) {
     let from: Vec<seams::From> =
         scene.field.pos.iter().map(|p| [p.y() as u32 + half, p.x() as u32 + half]).collect();
     let target = codes(SIDE, SIDE, |y, x| scene.target.pixel(y + N / 2, x + N / 2));
-    let canvas =
-        Canvas { source: &scene.source.image, usable: None, target: &target, wrap: scene.wrap };
+    let canvas = Canvas {
+        source: &scene.source.image,
+        atlas: &scene.source.atlas,
+        usable: None,
+        target: &target,
+        wrap: scene.wrap,
+    };
     let run = |from: &mut Vec<seams::From>| seams::settle(ctx, &canvas, from, SWEEPS).unwrap();
     // The number of neighbours from different pieces, weighted by how much they differ.
     let seam = |from: &[seams::From]| -> i64 {

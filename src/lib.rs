@@ -31,9 +31,9 @@ pub use image::mask::Mask;
 pub use image::material::MapKind;
 pub use image::picture::{Encoding, Picture, Samples};
 pub use image::sigma_map::SigmaMap;
-pub use image::sourcemap::SourceMap;
+pub use image::sourcemap::{Origin, SourceMap};
+pub use image::symmetry::Symmetry;
+pub use verb::inputs::Inputs;
+pub use verb::params::{Axis, Measure, Method, Quality, Size, Symmetries, TileParams};
 pub use verb::texture_cost::{TextureCost, TextureCostParams, texture_cost};
-pub use verb::tile::{
-    Axis, Costs, Guides, Measure, Method, Quality, Report, Size, Step, Tile, TileParams, tile,
-    tile_guided,
-};
+pub use verb::tile::{Costs, Report, Step, Tile, tile, tiles};

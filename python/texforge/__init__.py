@@ -8,7 +8,14 @@ tile over many photos.
 Everything raised on purpose is a `TexforgeError`.
 """
 
-from texforge._api import apply, load_source_map, read_image, tile, write_image
+from texforge._api import (
+    apply,
+    load_source_map,
+    read_image,
+    tile,
+    tile_variants,
+    write_image,
+)
 from texforge._errors import (
     AccessError,
     Cancelled,
@@ -42,8 +49,10 @@ from texforge._types import (
     Quality,
     SourceMap,
     Step,
+    Symmetries,
     TextureCost,
     Tile,
+    TileOptions,
 )
 
 __all__ = [
@@ -74,9 +83,11 @@ __all__ = [
     "SourceMap",
     "Step",
     "Study",
+    "Symmetries",
     "TexforgeError",
     "TextureCost",
     "Tile",
+    "TileOptions",
     "__version__",
     "apply",
     "load_source_map",
@@ -84,5 +95,6 @@ __all__ = [
     "study",
     "texture_cost",
     "tile",
+    "tile_variants",
     "write_image",
 ]

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import inspect
 import json
-from collections.abc import Mapping  # noqa: TC003 (the signatures can be resolved at run time)
-from typing import Any, Literal
+from collections.abc import Mapping, Sequence  # noqa: TC003 (the signatures can be resolved at run time)
+from typing import Any, Literal, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -26,10 +27,12 @@ from texforge._types import (
     Quality,
     SourceMap,
     Step,
+    Symmetries,
     Tile,
+    TileOptions,
 )
 
-__all__ = ["apply", "load_source_map", "read_image", "tile", "write_image"]
+__all__ = ["apply", "load_source_map", "read_image", "tile", "tile_variants", "write_image"]
 
 # Longest side of a notebook's picture: larger ones only slow the page down.
 _PREVIEW_SIDE = 1024
@@ -48,10 +51,15 @@ def tile(
     uniformity: float = 1.0,
     rarity: float = 1.0,
     quality: Quality = "normal",
+    avoid_grow: int = 0,
+    flatten: float = 0.0,
+    symmetry: Symmetries = "none",
     seed: int = 0,
+    also: Sequence[ImageLike] | None = None,
     mask: ImageLike | None = None,
+    avoid: ImageLike | None = None,
     sigma_map: ImageLike | None = None,
-    maps: Mapping[str, ImageLike] | None = None,
+    maps: Mapping[str, ImageLike | Sequence[ImageLike]] | None = None,
     encoding: Encoding | Literal["auto"] = "auto",
     threads: int | None = None,
     progress: Progress = None,
@@ -60,7 +68,7 @@ def tile(
     """Turn a photo into a texture that repeats without a seam and without a giveaway blob.
 
     Every pixel of the tile is a copy of a pixel of the photo (except with the method
-    ``"make-seamless"``), bit for bit.
+    ``"make-seamless"``; see `flatten` for what it does to the photo first), bit for bit.
 
     Parameters
     ----------
@@ -95,18 +103,38 @@ def tile(
         back, 0 (not at all) to 4. For the method ``"stationary"``.
     quality : {"draft", "normal", "best"}
         How much time to spend.
+    avoid_grow : int
+        How far the marks of `avoid` are grown, in pixels, 0 to 10000: nothing this near to a mark
+        (as the crow flies) is copied.
+    flatten : float
+        Reach of the light flattening, as a fraction of the photo's shorter side, 0 (off) or 0.02
+        to 1: differences of light and of its colour that are wider are divided out of the photo
+        before it is used. The tile then is made of the flattened photo's pixels; `maps` are left
+        as they are.
+    symmetry : {"none", "mirror", "rotate", "all"}
+        Whether patches of the photo are also used mirrored left to right, turned by quarters, or
+        both: more to choose from, but light then falls from several sides. Time and memory grow
+        with it, up to eight photos'.
     seed : int
         Seed of all random choices, 0 to 2**64 - 1.
+    also : sequence of array_like or Pillow images, optional
+        Further photos to mix with the first, of its data type and channels and of any sizes. What
+        is wholly opaque in them may be used; `mask` and `avoid` are those of the first.
     mask : (H, W) array_like, or Pillow image, optional
         Where the photo may be used: True, or at least half of full scale (128 of 255).
+    avoid : (H, W) array_like, or Pillow image, optional
+        What must not be copied from the photo, such as stains: marks that are True, or at least
+        half of full scale. May be given together with `mask`.
     sigma_map : (H', W') array_like, or Pillow image, optional
         Sigma at every pixel of the tile (and of its size), in place of `sigma`. Floats are sigma
         itself, 0.01 to 1. Of integers black is 0.01, half of full scale 0.1 and white 1, in even
         factors. ``costs.stationarity`` is measured with `sigma` still.
     maps : mapping of str to array_like, optional
         Other maps of the same material by name, to be tiled the same way. The name decides what
-        a map is: base colour and emission are colours, normals are vectors (and come out with
-        unit length), everything else is data.
+        a map is: base colour and emission are colours, normals are vectors (turned with the photo
+        and of unit length), everything else is data. With further photos, each is a sequence of
+        one map a photo. With quarter turns a map of normals must say which way green points:
+        ``normal_gl`` (up) or ``normal_dx`` (down).
     encoding : {"auto", "srgb", "linear", "data"}
         What the photo's numbers mean: display-referred sRGB, linear light with sRGB primaries,
         or numbers that are no colours (then there is no alpha either). ``"auto"`` is what
@@ -163,41 +191,107 @@ def tile(
     >>> bool(np.all(tile.image == photo[y, x]))
     True
     """
+    arguments = locals()
+    (made,) = _tiles(1, **arguments)
+    return made
+
+
+def tile_variants(image: ImageLike, count: int, **options: Unpack[TileOptions]) -> list[Tile]:
+    """Make several tiles of one photo, which is analysed once.
+
+    Parameters
+    ----------
+    image : (H, W) or (H, W, C) array_like, or Pillow image
+        The photo.
+    count : int
+        How many, 1 to 1000. The first is what `tile` makes of the same arguments; the others have
+        the seeds after its `seed`.
+    **options
+        Those of `tile`.
+
+    Returns
+    -------
+    list of Tile
+        All of them; choose.
+
+    Raises
+    ------
+    ParameterError
+        If `count` is out of range, more than 1 with the method ``"make-seamless"``, which makes
+        no random choices, or leads beyond the last seed; and as `tile`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import texforge
+    >>> photo = np.random.default_rng(0).integers(0, 256, (64, 64, 3), dtype=np.uint8)
+    >>> tiles = texforge.tile_variants(photo, 3, size=32, seed=5, quality="draft")
+    >>> best = min(tiles, key=lambda tile: tile.costs.stationarity)
+    >>> best.seed in (5, 6, 7)
+    True
+    """
+    arguments = inspect.signature(tile).bind(image, **options)
+    arguments.apply_defaults()
+    return _tiles(_arrays.integer("count", count, 1, 1000), **arguments.arguments)
+
+
+def _tiles(
+    count: int,
+    *,
+    image: ImageLike,
+    seed: int,
+    also: Sequence[ImageLike] | None,
+    mask: ImageLike | None,
+    avoid: ImageLike | None,
+    sigma_map: ImageLike | None,
+    maps: Mapping[str, ImageLike | Sequence[ImageLike]] | None,
+    encoding: Encoding | Literal["auto"],
+    threads: int | None,
+    progress: Progress,
+    trace: bool,
+    **params: Any,
+) -> list[Tile]:
     photo = _arrays.picture(image, "the photo", encoding)
-    params = {
-        "size": _size_text(size),
-        "axis": _arrays.word("axis", axis),
-        "method": _arrays.word("method", method),
-        "measure": _arrays.word("measure", measure),
-        "order": str(_arrays.integer("order", order)),
-        "sigma": _number("sigma", sigma),
-        "patch": str(_arrays.integer("patch", patch)),
-        "uniformity": _number("uniformity", uniformity),
-        "rarity": _number("rarity", rarity),
-        "quality": _arrays.word("quality", quality),
-    }
-    if maps and method == "make-seamless":
+    further = [
+        _arrays.picture(other, f"photo {i}", encoding) for i, other in enumerate(also or (), 2)
+    ]
+    texts = [
+        (param["name"], _text(param["name"], param["kind"], params[param["name"]]))
+        for param in _texforge.schema()
+    ]
+    if maps and params["method"] == "make-seamless":
         raise ParameterError(
             "`maps` must be empty with method 'make-seamless', which blends and so leaves nothing "
             f"to apply to other maps, got {', '.join(map(repr, maps))}",
             fields={"name": "maps"},
         )
-    others = {name: _map(other, name) for name, other in (maps or {}).items()}
+    others = {name: _maps(other, name, len(further)) for name, other in (maps or {}).items()}
     kinds = {name: _texforge.map_kind(name) for name in others}
     with reporting(progress) as callback:
-        picture_out, map_out, maps_out, report_text, steps = _texforge.tile(
+        made = _texforge.tiles(
             photo=photo.packed(),
+            also=[other.packed() for other in further],
             mask=None if mask is None else _arrays.mask(mask).packed(),
+            avoid=None if avoid is None else _arrays.mask(avoid, "the avoid mask").packed(),
             sigma_map=None
             if sigma_map is None
             else _arrays.picture(sigma_map, "the sigma map", "data").packed(),
-            maps=[(name, other.packed(), kinds[name]) for name, other in others.items()],
-            params=list(params.items()),
+            maps=[
+                (name, [other.packed() for other in all_of_it], kinds[name])
+                for name, all_of_it in others.items()
+            ],
+            params=texts,
             seed=_arrays.integer("seed", seed),
+            count=count,
             threads=_arrays.integer("threads", threads or 0, high=1024),
             progress=callback,
             trace=bool(trace),
         )
+    return [_tile(photo, others, parts) for parts in made]
+
+
+def _tile(photo: _arrays.Picture, others: dict[str, list[_arrays.Picture]], parts: Any) -> Tile:
+    picture_out, map_out, maps_out, report_text, steps = parts
     report = json.loads(report_text)
     report["notes"] = [*report["notes"], *photo.notes]
     return Tile(
@@ -207,10 +301,12 @@ def tile(
         seed=report["seed"],
         params=_typed(dict(report["params"])),
         report=report,
-        maps={name: others[name].unpacked(parts) for name, parts in maps_out},
+        maps={name: others[name][0].unpacked(parts) for name, parts in maps_out},
         encoding=_arrays.array_encoding(picture_out[3]),
         photo_size=(photo.array.shape[0], photo.array.shape[1]),
         trace=[Step(level, i, texture or 0.0, even) for level, i, texture, even in steps],
+        also_sizes=() if map_out is None else tuple(map_out[2][1:]),
+        origins=None if map_out is None else _origins(map_out),
     )
 
 
@@ -220,6 +316,7 @@ def apply(
     *,
     kind: MapKind = "data",
     source_size: tuple[int, int] | None = None,
+    also: Sequence[ImageLike] = (),
 ) -> npt.NDArray[Any]:
     """Replay a source map on another map of the photo's material.
 
@@ -230,11 +327,15 @@ def apply(
     image : (H', W') or (H', W', C) array_like, or Pillow image
         The map, showing the same as the photo. At another resolution (but the same aspect ratio)
         it is read in between its pixels, bilinearly; otherwise values are copied bit for bit.
-    kind : {"data", "color", "normal"}
-        What the map's numbers are. Normals, stored as ``(n + 1) / 2``, come out with unit length.
+    kind : {"data", "color", "normal", "normal_gl", "normal_dx"}
+        What the map's numbers are. Normals, stored as ``(n + 1) / 2``, are turned with the photo
+        and come out with unit length; if the photo was turned by quarters, they must be
+        ``"normal_gl"`` (green points up) or ``"normal_dx"`` (down).
     source_size : (int, int), optional
         Height and width of the photo, for a `source_map` that is a plain array; by default
         those of `image`.
+    also : sequence of array_like, optional
+        The same map of each further photo, for a tile made of several.
 
     Returns
     -------
@@ -258,15 +359,16 @@ def apply(
     """
     if isinstance(source_map, Tile):
         source_map = _source_map_of(source_map)
-    if isinstance(source_map, SourceMap):
-        source_size = source_map.source_size
-    positions = _arrays.positions(source_map)
-    other = _arrays.picture(image, "the map", "auto" if kind == "color" else "data")
-    if source_size is None:
-        source_size = (other.array.shape[0], other.array.shape[1])
+    encoding: Literal["auto", "data"] = "auto" if kind == "color" else "data"
+    other = _arrays.picture(image, "the map", encoding)
+    further = [_arrays.picture(one, f"map {i}", encoding) for i, one in enumerate(also, 2)]
+    if not isinstance(source_map, SourceMap):
+        if source_size is None:
+            source_size = (other.array.shape[0], other.array.shape[1])
+        source_map = SourceMap(_arrays.positions(source_map), source_size)
     out = _texforge.apply(
-        source_map=_arrays.packed_map(positions, source_size),
-        picture=other.packed(),
+        source_map=_arrays.packed_map(source_map),
+        pictures=[one.packed() for one in (other, *further)],
         kind=_arrays.word("kind", kind),
     )
     return other.unpacked(out)
@@ -282,7 +384,7 @@ def read_image(path: PathType, *, kind: MapKind = "color") -> Image:
     ----------
     path : path
         The file.
-    kind : {"color", "data", "normal"}
+    kind : {"color", "data", "normal", "normal_gl", "normal_dx"}
         What its numbers are. Only colours are converted.
 
     Returns
@@ -321,7 +423,7 @@ def write_image(
         The file; its extension decides the format.
     image : (H, W) or (H, W, C) array_like, or Pillow image
         The picture. What the format cannot hold is refused, never rounded away.
-    kind : {"color", "data", "normal"}
+    kind : {"color", "data", "normal", "normal_gl", "normal_dx"}
         What its numbers are.
     encoding : {"auto", "srgb", "linear", "data"}
         What a colour picture's numbers mean, as for `tile`.
@@ -377,15 +479,17 @@ def load_source_map(path: PathType) -> SourceMap:
         If the operating system refuses (also FileNotFoundError, PermissionError, OSError).
     """
     parts = _texforge.read_source_map(path=_arrays.path(path))
-    return SourceMap(positions=_positions(parts), source_size=parts[2])
+    first, *further = parts[2]
+    return SourceMap(_positions(parts), first, tuple(further), _origins(parts))
 
 
 def save_source_map(tile: Tile, path: PathType, *, overwrite: bool) -> None:
     """See `Tile.save_source_map`."""
     source_map = _source_map_of(tile)
-    packed = _arrays.packed_map(_arrays.positions(source_map.positions), source_map.source_size)
     _texforge.write_source_map(
-        path=_arrays.path(path), source_map=packed, overwrite=bool(overwrite)
+        path=_arrays.path(path),
+        source_map=_arrays.packed_map(source_map),
+        overwrite=bool(overwrite),
     )
 
 
@@ -435,22 +539,39 @@ def _source_map_of(tile: Tile) -> SourceMap:
             "'make-seamless' blends; choose another method",
             fields={"name": "source_map"},
         )
-    return SourceMap(positions=tile.source_map, source_size=tile.photo_size)
+    return SourceMap(tile.source_map, tile.photo_size, tile.also_sizes, tile.origins)
 
 
-def _map(image: ImageLike, name: object) -> _arrays.Picture:
+def _maps(images: Any, name: object, further: int) -> list[_arrays.Picture]:
+    """Return a map of each photo; with one photo `images` is the map itself."""
     if not isinstance(name, str):
         raise ParameterError(
             f"`maps` must be a mapping with names as keys, got the key {name!r}",
             fields={"name": "maps"},
         )
     encoding = "auto" if _texforge.map_kind(name) == "color" else "data"
-    return _arrays.picture(image, f"the map `{name}`", encoding)
+    if not further:
+        return [_arrays.picture(images, f"the map `{name}`", encoding)]
+    if not isinstance(images, list | tuple) or len(images) != 1 + further:
+        got = f"{len(images)}" if isinstance(images, list | tuple) else type(images).__name__
+        raise ParameterError(
+            f"`maps` must be a list of {1 + further} for each name, one of each photo, "
+            f"got {got} for {name!r}",
+            fields={"name": "maps"},
+        )
+    return [_arrays.picture(image, f"the map `{name}`", encoding) for image in images]
 
 
-def _positions(parts: tuple[bytearray, tuple[int, int], tuple[int, int]]) -> npt.NDArray[np.int32]:
-    data, (height, width), _ = parts
+def _positions(parts: Any) -> npt.NDArray[np.int32]:
+    data, (height, width), _, _ = parts
     return np.frombuffer(data, dtype=np.int32).reshape(height, width, 2)
+
+
+def _origins(parts: Any) -> npt.NDArray[np.int32] | None:
+    _, (height, width), _, origins = parts
+    if origins is None:
+        return None
+    return np.frombuffer(origins, dtype=np.int32).reshape(height, width, 2)
 
 
 def _size_text(size: object) -> str:
@@ -463,6 +584,15 @@ def _size_text(size: object) -> str:
         )
     height, width = (_arrays.integer("size", side, 1) for side in sides)
     return f"{width}x{height}"
+
+
+def _text(name: str, kind: str, value: Any) -> str:
+    """Return a parameter as the text that the core reads."""
+    if kind == "size":
+        return _size_text(value)
+    if kind == "integer":
+        return str(_arrays.integer(name, value))
+    return _number(name, value) if kind == "number" else _arrays.word(name, value)
 
 
 def _number(name: str, value: Any) -> str:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from texforge._errors import ParameterError, PictureError
-from texforge._types import Encoding, Image
+from texforge._types import Encoding, Image, SourceMap
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -132,13 +132,13 @@ def picture(image: Any, what: str, encoding: str = "auto") -> Picture:
     return Picture(whole, encoding, flat, isinstance(image, Image), notes)
 
 
-def mask(mask: Any) -> Picture:
-    """Return a mask ready for the core: white or True is usable."""
+def mask(mask: Any, what: str = "the mask") -> Picture:
+    """Return a mask ready for the core: white or True is set."""
     if not hasattr(mask, "mode"):
-        array = _from_any(mask, "the mask")
+        array = _from_any(mask, what)
         if array.dtype == np.bool_:
             mask = array.astype(np.uint8) * np.uint8(255)
-    return picture(mask, "the mask", "srgb")
+    return picture(mask, what, "srgb")
 
 
 def positions(source_map: Any) -> npt.NDArray[np.int32]:
@@ -161,17 +161,32 @@ def positions(source_map: Any) -> npt.NDArray[np.int32]:
 
 
 def packed_map(
-    positions: npt.NDArray[np.int32], source_size: object
-) -> tuple[Any, tuple[int, int], tuple[int, int]]:
+    source_map: SourceMap,
+) -> tuple[Any, tuple[int, int], list[tuple[int, int]], Any]:
     """Return a source map as the parts that the core takes."""
-    if not isinstance(source_size, tuple | list) or len(source_size) != 2:
-        raise ParameterError(
-            f"`source_size` must be (height, width), got {source_size!r}",
-            fields={"name": "source_size"},
-        )
-    height, width = (integer("source_size", side, 1, 2**31) for side in source_size)
-    shape = (positions.shape[0], positions.shape[1])
-    return positions.reshape(-1).view(np.uint8), shape, (height, width)
+    places = positions(source_map.positions)
+    sizes = []
+    all_sizes: tuple[object, ...] = (source_map.source_size, *source_map.further_sizes)
+    for size in all_sizes:
+        if not isinstance(size, tuple | list) or len(size) != 2:
+            raise ParameterError(
+                f"`source_size` must be (height, width), got {size!r}",
+                fields={"name": "source_size"},
+            )
+        height, width = (integer("source_size", side, 1, 2**31) for side in size)
+        sizes.append((height, width))
+    origins = source_map.origins
+    if origins is not None:
+        origins = positions(origins)
+        if origins.shape != places.shape:
+            raise PictureError(
+                f"the source map has positions of shape {places.shape} and origins of shape "
+                f"{origins.shape}; they must be the same",
+                fields={"what": "the source map"},
+            )
+        origins = origins.reshape(-1).view(np.uint8)
+    shape = (places.shape[0], places.shape[1])
+    return places.reshape(-1).view(np.uint8), shape, sizes, origins
 
 
 def integer(name: str, value: Any, low: int = 0, high: int = 2**64 - 1) -> int:

@@ -6,7 +6,7 @@ from typing import Literal
 
 from texforge import _arrays, _texforge
 from texforge._progress import reporting
-from texforge._types import Axis, Encoding, ImageLike, Progress, TextureCost, Tile
+from texforge._types import Axis, Encoding, ImageLike, Progress, SourceMap, TextureCost, Tile
 
 __all__ = ["texture_cost"]
 
@@ -91,7 +91,9 @@ def texture_cost(
     image: ImageLike = texture.image if isinstance(texture, Tile) else texture
     source_map = None
     if isinstance(texture, Tile) and texture.source_map is not None:
-        source_map = _arrays.packed_map(texture.source_map, texture.photo_size)
+        source_map = _arrays.packed_map(
+            SourceMap(texture.source_map, texture.photo_size, texture.also_sizes, texture.origins)
+        )
     params = {
         "axis": _arrays.word("axis", axis),
         "patch": str(_arrays.integer("patch", patch)),

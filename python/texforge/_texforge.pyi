@@ -5,9 +5,11 @@ from typing import Any
 
 _Picture = tuple[Any, str, tuple[int, int, int], str]
 _PictureOut = tuple[bytearray, str, tuple[int, int, int], str]
-_Map = tuple[Any, tuple[int, int], tuple[int, int]]
-_MapOut = tuple[bytearray, tuple[int, int], tuple[int, int]]
 _Step = tuple[int, int, float | None, float]
+_Size = tuple[int, int]
+_Map = tuple[Any, _Size, list[_Size], Any]
+_MapOut = tuple[bytearray, _Size, list[_Size], bytearray | None]
+_TileOut = tuple[_PictureOut, _MapOut | None, list[tuple[str, _PictureOut]], str, list[_Step]]
 
 __all__ = [
     "__version__",
@@ -22,25 +24,28 @@ __all__ = [
     "read_source_map",
     "schema",
     "texture_cost",
-    "tile",
+    "tiles",
     "write",
     "write_source_map",
 ]
 
 __version__: str
 
-def tile(
+def tiles(
     *,
     photo: _Picture,
+    also: list[_Picture],
     mask: _Picture | None,
+    avoid: _Picture | None,
     sigma_map: _Picture | None,
-    maps: list[tuple[str, _Picture, str]],
+    maps: list[tuple[str, list[_Picture], str]],
     params: list[tuple[str, str]],
     seed: int,
+    count: int,
     threads: int,
     progress: Callable[[float], object] | None,
     trace: bool,
-) -> tuple[_PictureOut, _MapOut | None, list[tuple[str, _PictureOut]], str, list[_Step]]: ...
+) -> list[_TileOut]: ...
 def texture_cost(
     *,
     texture: _Picture,
@@ -52,7 +57,7 @@ def texture_cost(
     threads: int,
     progress: Callable[[float], object] | None,
 ) -> tuple[float, float, int]: ...
-def apply(*, source_map: _Map, picture: _Picture, kind: str) -> _PictureOut: ...
+def apply(*, source_map: _Map, pictures: list[_Picture], kind: str) -> _PictureOut: ...
 def read(*, path: str, kind: str) -> _PictureOut: ...
 def write(
     *, path: str, picture: _Picture, kind: str, record: str | None, overwrite: bool

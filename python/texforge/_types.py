@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol, TypeAlias, TypedDict
 
 import numpy as np
 import numpy.typing as npt
@@ -28,8 +28,10 @@ __all__ = [
     "Quality",
     "SourceMap",
     "Step",
+    "Symmetries",
     "TextureCost",
     "Tile",
+    "TileOptions",
 ]
 
 # Unions, not Literal["a", "b"]: mypy holds both for the same, stubtest only the union.
@@ -45,9 +47,17 @@ Measure: TypeAlias = (
 """The statistic that is made equal everywhere in a tile."""
 Quality: TypeAlias = Literal["draft"] | Literal["normal"] | Literal["best"]
 """How much time to spend."""
+Symmetries: TypeAlias = Literal["none"] | Literal["mirror"] | Literal["rotate"] | Literal["all"]
+"""In which symmetries the photo's patches are used."""
 Encoding: TypeAlias = Literal["srgb"] | Literal["linear"] | Literal["data"]
 """What the numbers of a picture mean."""
-MapKind: TypeAlias = Literal["color"] | Literal["data"] | Literal["normal"]
+MapKind: TypeAlias = (
+    Literal["color"]
+    | Literal["data"]
+    | Literal["normal"]
+    | Literal["normal_gl"]
+    | Literal["normal_dx"]
+)
 """What the numbers of a material's map mean."""
 PathType: TypeAlias = str | PathLike[str]
 """Where a file is."""
@@ -69,6 +79,34 @@ ImageLike: TypeAlias = npt.ArrayLike | _PillowImage
 """Anything that `numpy.asarray` makes a picture of, or a Pillow image."""
 Progress: TypeAlias = bool | Callable[[float], object] | ProgressBar | None
 """What `progress=` may be: see `texforge.tile`."""
+
+
+class TileOptions(TypedDict, total=False):
+    """The options of `texforge.tile`, for `texforge.tile_variants`."""
+
+    size: int | tuple[int, int] | None
+    axis: Axis
+    method: Method
+    measure: Measure
+    order: int
+    sigma: float
+    patch: int
+    uniformity: float
+    rarity: float
+    quality: Quality
+    avoid_grow: int
+    flatten: float
+    symmetry: Symmetries
+    seed: int
+    also: Sequence[ImageLike] | None
+    mask: ImageLike | None
+    avoid: ImageLike | None
+    sigma_map: ImageLike | None
+    maps: Mapping[str, ImageLike | Sequence[ImageLike]] | None
+    encoding: Encoding | Literal["auto"]
+    threads: int | None
+    progress: Progress
+    trace: bool
 
 
 class Image(np.ndarray[Any, np.dtype[Any]]):
@@ -194,22 +232,32 @@ class SourceMap:
     positions : (H, W, 2) ndarray of int32
         Row and column of the photo's pixel that each pixel is a copy of.
     source_size : (int, int)
-        Height and width of the photo.
+        Height and width of the (first) photo.
+    further_sizes : tuple of (int, int)
+        Height and width of the photos after the first.
+    origins : (H, W, 2) ndarray of int32, or None
+        Which photo each pixel is of, from 0 on, and in which symmetry: quarter turns
+        counter-clockwise, and 4 more if the photo was mirrored left to right before. None if all
+        are of the only photo, as it lies.
     """
 
     positions: npt.NDArray[np.int32]
     source_size: tuple[int, int]
+    further_sizes: tuple[tuple[int, int], ...] = ()
+    origins: npt.NDArray[np.int32] | None = None
 
     def __array__(self, dtype: Any = None, *, copy: bool | None = None) -> npt.NDArray[Any]:
         """Return the positions."""
         array: npt.NDArray[Any] = np.asarray(self.positions, dtype=dtype)
         return array.copy() if copy and array is self.positions else array
 
-    def apply(self, image: ImageLike, *, kind: MapKind = "data") -> npt.NDArray[Any]:
+    def apply(
+        self, image: ImageLike, *, kind: MapKind = "data", also: Sequence[ImageLike] = ()
+    ) -> npt.NDArray[Any]:
         """Make another map of the photo's material match: see `texforge.apply`."""
         from texforge import _api
 
-        return _api.apply(self, image, kind=kind)
+        return _api.apply(self, image, kind=kind, also=also)
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -224,8 +272,8 @@ class Tile:
         The tile, with the data type and the number of channels of the photo.
     source_map : (H, W, 2) ndarray of int32, or None
         Row and column of the photo's pixel that each pixel is a copy of, so that
-        ``image == photo[source_map[..., 0], source_map[..., 1]]``. None for the method
-        ``"make-seamless"``, which blends.
+        ``image == photo[source_map[..., 0], source_map[..., 1]]`` (of one photo; see `origins`).
+        None for the method ``"make-seamless"``, which blends.
     costs : Costs
         How well it went.
     seed : int
@@ -240,10 +288,15 @@ class Tile:
     encoding : {"srgb", "linear", "data"}
         What the numbers of `image` mean.
     photo_size : (int, int)
-        Height and width of the photo.
+        Height and width of the (first) photo.
     trace : list of Step
         The costs of every iteration, coarse to fine, if ``trace=True`` was asked for; else, and
         with the method ``"make-seamless"``, which has no iterations, empty.
+    also_sizes : tuple of (int, int)
+        Height and width of the further photos.
+    origins : (H, W, 2) ndarray of int32, or None
+        Which photo each pixel is of and in which symmetry: see `SourceMap`. None if all are of
+        the only photo, as it lies.
     """
 
     image: npt.NDArray[Any]
@@ -256,8 +309,12 @@ class Tile:
     encoding: Encoding
     photo_size: tuple[int, int]
     trace: list[Step]
+    also_sizes: tuple[tuple[int, int], ...] = ()
+    origins: npt.NDArray[np.int32] | None = None
 
-    def apply(self, image: ImageLike, *, kind: MapKind = "data") -> npt.NDArray[Any]:
+    def apply(
+        self, image: ImageLike, *, kind: MapKind = "data", also: Sequence[ImageLike] = ()
+    ) -> npt.NDArray[Any]:
         """Make another map of the photo's material match the tile.
 
         Parameters
@@ -265,7 +322,9 @@ class Tile:
         image : array_like
             The map, showing the same as the photo; of any resolution with its aspect ratio.
         kind : {"data", "color", "normal"}
-            What its numbers are. Normals come out with unit length.
+            What its numbers are: see `texforge.apply`.
+        also : sequence of array_like
+            The same map of each further photo.
 
         Returns
         -------
@@ -281,7 +340,7 @@ class Tile:
         """
         from texforge import _api
 
-        return _api.apply(self, image, kind=kind)
+        return _api.apply(self, image, kind=kind, also=also)
 
     def save(self, path: PathType, *, overwrite: bool = False) -> None:
         """Write the tile to a file that also records how it was made.

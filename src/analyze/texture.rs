@@ -8,7 +8,7 @@ use crate::image::sourcemap::SourceMap;
 use crate::search::patchmatch::Wrap;
 
 /// Mean squared distance per patch pixel (L*a*b* units squared) between the patches of `texture`
-/// and the patches of `photo` that `map` names for their centres: an upper bound of the texture
+/// and the patches of `photos` that `map` names for their centres: an upper bound of the texture
 /// cost, which takes the best patch of the whole photo.
 ///
 /// The mean is over an even grid of at most 16384 patches. Patches at the photo's border are moved
@@ -21,14 +21,13 @@ use crate::search::patchmatch::Wrap;
 /// Same bytes for any thread count.
 pub fn cost_bound(
     texture: &Picture,
-    photo: &Picture,
+    photos: &[&Picture],
     map: &SourceMap,
     patch: usize,
     wrap: Wrap,
 ) -> f64 {
-    let model = ColorModel::new(photo);
+    let model = ColorModel::new(photos[0]);
     let (h, w) = (texture.height(), texture.width());
-    let (eh, ew) = (photo.height(), photo.width());
     let half = (patch / 2) as isize;
     let step = ((h * w) as f64 / 16384.0).sqrt().ceil().max(1.0) as usize;
     let inside = |i: usize, n: usize, wrap: bool| {
@@ -36,25 +35,33 @@ pub fn cost_bound(
     };
     let rows: Vec<usize> = (0..h).step_by(step).filter(|&y| inside(y, h, wrap.y)).collect();
     let cols: Vec<usize> = (0..w).step_by(step).filter(|&x| inside(x, w, wrap.x)).collect();
-    let fit = |i: u32, n: usize| (i as isize).clamp(half, n as isize - 1 - half);
+    let fit = |i: usize, n: usize| (i as isize).clamp(half, n as isize - 1 - half);
     let per_row: Vec<f64> = rows
         .par_iter()
         .map(|&y| {
             let mut sum = 0.0;
             for &x in &cols {
-                let [sy, sx] = map.positions()[y * w + x];
+                let origin = map.origin(y * w + x);
+                let photo = photos[usize::from(origin.photo)];
+                let size = (photo.height(), photo.width());
+                // In the photo as it was laid.
+                let [sy, sx] = map.positions()[y * w + x].map(|i| i as usize);
+                let (sy, sx) = origin.symmetry.place((sy, sx), size);
+                let (eh, ew) = origin.symmetry.size(size);
                 let (sy, sx) = (fit(sy, eh), fit(sx, ew));
                 for dy in -half..=half {
                     for dx in -half..=half {
                         let ty = (y as isize + dy).rem_euclid(h as isize) as usize;
                         let tx = (x as isize + dx).rem_euclid(w as isize) as usize;
-                        let (py, px) = ((sy + dy) as usize, (sx + dx) as usize);
+                        let laid = ((sy + dy) as usize, (sx + dx) as usize);
+                        let (py, px) = origin.symmetry.source(laid, size);
                         // The same source pixel: no need to look at its colour.
-                        if map.positions()[ty * w + tx] == [py as u32, px as u32] {
+                        let same_photo = map.origin(ty * w + tx).photo == origin.photo;
+                        if same_photo && map.positions()[ty * w + tx] == [py as u32, px as u32] {
                             continue;
                         }
                         let f = model.matching_pixel(texture, ty * w + tx);
-                        let e = model.matching_pixel(photo, py * ew + px);
+                        let e = model.matching_pixel(photo, py * size.1 + px);
                         sum += (0..3).map(|k| ((f[k] - e[k]) as f64).powi(2)).sum::<f64>();
                     }
                 }

@@ -79,6 +79,12 @@ impl Ctx {
         Ok(Self { seed, simd: Simd::default(), job: Arc::default(), pool: Arc::new(pool) })
     }
 
+    /// The same context with another seed.
+    #[must_use]
+    pub fn with_seed(&self, seed: u64) -> Self {
+        Self { seed, ..self.clone() }
+    }
+
     /// The progress and cancel handle of this run.
     pub fn job(&self) -> Arc<Job> {
         Arc::clone(&self.job)

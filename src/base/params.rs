@@ -147,7 +147,7 @@ macro_rules! params {
             /// [`Error::Parameter`](crate::Error::Parameter) naming the first that fails.
             pub fn validate(&self) -> $crate::base::error::Result<()> {
                 $($(
-                    if !(self.$field >= $lo && self.$field <= $hi) {
+                    if !($lo..=$hi).contains(&self.$field) {
                         return Err($crate::base::error::Error::parameter(
                             stringify!($field), format!("{} to {}", $lo, $hi), self.$field));
                     }

@@ -6,6 +6,7 @@ use clap::ArgMatches;
 use serde_json::json;
 
 use crate::base::error::{Error, Result};
+use crate::base::params::Value as _;
 use crate::cli::files;
 use crate::cli::output::{Target, to_stdout};
 use crate::cli::show::duration;
@@ -17,7 +18,8 @@ use crate::image::material::MapKind;
 #[derive(Debug)]
 struct Request {
     source_map: PathBuf,
-    map: PathBuf,
+    /// One of each photo.
+    maps: Vec<PathBuf>,
     target: Target,
     kind: Option<MapKind>,
     force: bool,
@@ -30,15 +32,12 @@ struct Request {
 pub(super) fn run(matches: &ArgMatches) -> Result<()> {
     let path = |id| matches.get_one::<PathBuf>(id).cloned().unwrap_or_default();
     let json = matches.get_flag("json");
+    let also = matches.get_many::<PathBuf>("also").into_iter().flatten().cloned();
     let request = Request {
         source_map: path("source-map"),
-        map: path("map"),
+        maps: [path("map")].into_iter().chain(also).collect(),
         target: Target::typed(&path("output"))?,
-        kind: matches.get_one::<String>("kind").map(|word| match word.as_str() {
-            "color" => MapKind::Color,
-            "normal" => MapKind::Normal,
-            _ => MapKind::Data,
-        }),
+        kind: matches.get_one::<String>("kind").and_then(|word| MapKind::parse(word)),
         force: matches.get_flag("force"),
     };
     if json && request.target == Target::Stdout {
@@ -54,22 +53,26 @@ pub(super) fn run(matches: &ArgMatches) -> Result<()> {
 fn work(session: &Session, request: &Request) -> Result<serde_json::Value> {
     let target = request.target.file();
     if let Some(path) = target {
-        files::check_place(path, &[&request.source_map, &request.map], request.force)?;
+        let inputs = request.maps.iter().chain([&request.source_map]).map(PathBuf::as_path);
+        files::check_place(path, &inputs.collect::<Vec<_>>(), request.force)?;
     }
     let kind = request.kind.unwrap_or_else(|| {
-        let kind = files::kind_of_file(&request.map);
+        let kind = files::kind_of_file(&request.maps[0]);
         session.console.say(&format!(
             "{}: read as {} by its name (--kind says otherwise)",
-            request.map.display(),
-            word(kind)
+            request.maps[0].display(),
+            kind.show()
         ));
         kind
     });
-    let map = files::read(&request.map, kind)?;
-    session.check()?;
+    let mut maps = Vec::new();
+    for path in &request.maps {
+        maps.push(files::read(path, kind)?);
+        session.check()?;
+    }
     let source_map = files::read_source_map(&request.source_map)?;
     session.check()?;
-    let out = source_map.apply(&map, kind)?;
+    let out = source_map.apply_all(&maps.iter().collect::<Vec<_>>(), kind)?;
     let bytes = files::encode(&out, target, kind, None)?;
     session.check()?;
     match target {
@@ -92,20 +95,11 @@ fn work(session: &Session, request: &Request) -> Result<serde_json::Value> {
         "schema_version": SCHEMA_VERSION,
         "verb": "apply",
         "version": env!("CARGO_PKG_VERSION"),
-        "kind": word(kind),
+        "kind": kind.show(),
         "path": place.to_string_lossy(),
         "width": out.width(),
         "height": out.height(),
         "seconds": { "total": elapsed.as_secs_f64() },
-        "notes": map.meta.notes,
+        "notes": maps.iter().flat_map(|map| &map.meta.notes).collect::<Vec<_>>(),
     }))
-}
-
-/// The kind as `--kind` spells it.
-fn word(kind: MapKind) -> &'static str {
-    match kind {
-        MapKind::Color => "color",
-        MapKind::Data => "data",
-        MapKind::Normal => "normal",
-    }
 }

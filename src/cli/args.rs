@@ -2,13 +2,15 @@
 
 use std::path::PathBuf;
 
-use clap::builder::{PossibleValuesParser, StringValueParser, ValueParser};
+use clap::builder::{PossibleValuesParser, RangedU64ValueParser, StringValueParser, ValueParser};
 use clap::{Arg, ArgAction, ArgMatches, Command, ValueHint, value_parser};
 
 use crate::base::error::Result;
-use crate::base::params::Param;
+use crate::base::params::{Param, Value as _};
 use crate::cli::{maps, study};
-use crate::verb::tile::TileParams;
+use crate::image::material::MapKind;
+use crate::verb::params::TileParams;
+use crate::verb::tile::MAX_VARIANTS;
 
 const TILE_EXAMPLES: &str = "\
 Examples:
@@ -16,13 +18,17 @@ Examples:
   texforge tile brick.jpg -o brick.png --size 1024x1024 --preview
   texforge tile brick.jpg -o trim.png --axis x --quality best
   texforge tile scan.png -o wall.png --mask usable.png --map normal=scan_nrm.png
+  texforge tile brick.jpg -o clean.png --avoid stains.png --avoid-grow 12
+  texforge tile meadow.jpg -o meadow.png --flatten 0.2 --variants 4
+  texforge tile grass_a.jpg --also grass_b.jpg --symmetry all -o grass.png
   texforge tile brick.jpg -o - | display";
 
 const APPLY_EXAMPLES: &str = "\
 Examples:
   texforge tile brick.jpg -o brick.png --save-source-map brick_source.exr
   texforge apply brick_source.exr photo_normal.png -o brick_normal.png
-  texforge apply brick_source.exr photo_wetness.png -o brick_wetness.png --kind data";
+  texforge apply brick_source.exr photo_wetness.png -o brick_wetness.png --kind data
+  texforge apply grass_source.exr a_normal_gl.png --also b_normal_gl.png -o grass_normal_gl.png";
 
 /// The whole command line.
 pub(super) fn command() -> Command {
@@ -98,9 +104,20 @@ fn tile() -> Command {
         .args(TileParams::schema().into_iter().map(flag))
         .next_help_heading("Inputs")
         .arg(
+            file("also", "PHOTO", "A further photo to mix with the first, of the same sample type and channels and of \
+                 any size; may be repeated")
+                .long("also")
+                .action(ArgAction::Append),
+        )
+        .arg(
             file("mask", "FILE", "Picture of the photo's size: usable is where its first channel is at least half of \
                  full scale and its alpha, if any, too; the photo's own transparent pixels are never used")
                 .long("mask"),
+        )
+        .arg(
+            file("avoid", "FILE", "Picture of the photo's size whose marks are never copied: where its first channel is \
+                 at least half of full scale and its alpha, if any, too; --avoid-grow widens the marks")
+                .long("avoid"),
         )
         .arg(
             file("sigma-map", "FILE", "Grey picture of the tile's size that says sigma at every pixel, in place of \
@@ -115,13 +132,25 @@ fn tile() -> Command {
                 .value_parser(ValueParser::os_string())
                 .help(format!(
                     "A further map of the same surface that follows the tile pixel by pixel; may be \
-                     repeated. NAME is one of {}. Maps whose file name is the photo's with such an \
+                     repeated, and comes once for each photo, in their order. NAME is one of {}. Maps whose file name is the photo's with such an \
                      ending are taken by themselves",
                     maps::known_names()
                 )),
         )
         .arg(switch("no-maps", "Leave alone the maps that lie beside the photo"))
         .next_help_heading("Outputs")
+        .arg(
+            Arg::new("variants")
+                .long("variants")
+                .value_name("N")
+                .default_value("1")
+                .value_parser(RangedU64ValueParser::<usize>::new().range(1..=MAX_VARIANTS as u64))
+                .allow_negative_numbers(true)
+                .help(
+                    "Make N tiles, 1 to 1000, whose seeds are --seed and those after it; with two and more \
+                     every output's name is numbered: tile-1.png, tile-2.png, ...",
+                ),
+        )
         .arg(
             file("save-source-map", "FILE.exr", "Also write which photo pixel each tile pixel is, for `texforge apply`")
                 .long("save-source-map"),
@@ -164,11 +193,19 @@ fn apply() -> Command {
                 .required(true),
         )
         .arg(
+            file("also", "MAP", "The same map of the next photo, for a tile made of several; may be repeated")
+                .long("also")
+                .action(ArgAction::Append),
+        )
+        .arg(
             Arg::new("kind")
                 .long("kind")
                 .value_name("KIND")
-                .value_parser(["color", "data", "normal"])
-                .help("What the map's numbers are; without it the file's name decides"),
+                .value_parser(PossibleValuesParser::new(MapKind::CHOICES))
+                .help(
+                    "What the map's numbers are; without it the file's name decides. Normals whose green points \
+                     up are normal_gl (OpenGL), down normal_dx (DirectX)",
+                ),
         )
         .arg(switch("force", "Overwrite an output that exists already"))
         .arg(json())

@@ -49,10 +49,13 @@ pub(super) fn hint(error: &Error, command: &str, flags: &[String]) -> Option<Str
             Some(if has(&flag) { format!("change --{flag}; {help}") } else { help })
         }
         Error::TooSmall { .. } => Some(format!("change {}", first(&["patch", "size"])?)),
-        Error::EmptyMask { .. } => Some(format!("change {}", first(&["mask", "patch"])?)),
-        Error::Memory { .. } => Some(format!("change {}", first(&["size"])?)),
+        Error::EmptyMask { .. } => Some(format!("change {}", first(&["mask", "avoid", "patch"])?)),
+        Error::Memory { .. } => Some(format!("change {}", first(&["size", "symmetry"])?)),
         Error::SizeMismatch { what, .. } if what.contains("sigma map") => {
             Some(format!("change {}", first(&["sigma-map"])?))
+        }
+        Error::SizeMismatch { what, .. } if what.contains("avoid") => {
+            Some(format!("change {}", first(&["avoid"])?))
         }
         Error::SizeMismatch { what, .. } if what.contains("mask") => {
             Some(format!("change {}", first(&["mask"])?))

@@ -1,6 +1,7 @@
 //! The files room as this face needs it: results become bytes first and get their names last.
 
-use std::path::Path;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
 
 use crate::base::error::{Error, Result};
 use crate::image::io::{self, Format, WriteOptions};
@@ -85,6 +86,27 @@ pub(super) fn without_color_ending(stem: &str) -> &str {
     cuts.find(|(at, _)| is_color(&stem[at + 1..])).map_or(stem, |(at, _)| &stem[..at])
 }
 
+/// The name of variant `number`: `brick.png` becomes `brick-3.png`, `brick_basecolor.png`
+/// `brick-3_basecolor.png`.
+pub(super) fn numbered(path: &Path, number: usize) -> PathBuf {
+    let stem = path.file_stem().unwrap_or_default();
+    let mut name = OsString::new();
+    match stem.to_str().map(|s| s.split_at(without_color_ending(s).len())) {
+        Some((front, ending)) if !front.is_empty() => {
+            name.push(format!("{front}-{number}{ending}"));
+        }
+        _ => {
+            name.push(stem);
+            name.push(format!("-{number}"));
+        }
+    }
+    if let Some(extension) = path.extension() {
+        name.push(".");
+        name.push(extension);
+    }
+    path.with_file_name(name)
+}
+
 fn is_separator(c: char) -> bool {
     matches!(c, '_' | '-' | '.' | ' ')
 }
@@ -104,6 +126,20 @@ mod tests {
         ];
         for (stem, want) in cases {
             assert_eq!(without_color_ending(stem), want, "{stem}");
+        }
+    }
+
+    #[test]
+    fn variants_are_numbered_before_the_color_ending() {
+        let cases = [
+            ("a/brick.png", "a/brick-3.png"),
+            ("brick_basecolor.v2.png", "brick_basecolor.v2-3.png"),
+            ("brick_basecolor.png", "brick-3_basecolor.png"),
+            ("basecolor.png", "basecolor-3.png"),
+            ("brick", "brick-3"),
+        ];
+        for (path, want) in cases {
+            assert_eq!(numbered(Path::new(path), 3), Path::new(want), "{path}");
         }
     }
 

@@ -7,26 +7,28 @@ use crate::base::error::{Error, Result};
 use crate::cli::files;
 use crate::image::material::{MapKind, MapName};
 use crate::image::picture::Picture;
-use crate::image::sourcemap::SourceMap;
 
 /// A map as asked for.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Wanted {
     /// Its name, e.g. `normal`; ends the output's file name.
     pub(super) name: &'static str,
-    /// The file.
-    pub(super) path: PathBuf,
+    /// The files, one of each photo.
+    pub(super) paths: Vec<PathBuf>,
     /// What its numbers are.
     pub(super) kind: MapKind,
     /// Whether it was found beside the photo rather than typed.
     pub(super) found: bool,
 }
 
-/// The maps typed as NAME=FILE.
+/// The maps typed as NAME=FILE, once for each of `n_photos` in their order.
 ///
 /// # Errors
-/// [`Error::Parameter`] for a missing `=`, an unknown name, a name given twice.
-pub(super) fn typed<'a>(specs: impl Iterator<Item = &'a OsString>) -> Result<Vec<Wanted>> {
+/// [`Error::Parameter`] for a missing `=`, an unknown name, a name given more or less often.
+pub(super) fn typed<'a>(
+    specs: impl Iterator<Item = &'a OsString>,
+    n_photos: usize,
+) -> Result<Vec<Wanted>> {
     let mut maps: Vec<Wanted> = Vec::new();
     for spec in specs {
         let shown = || format!("`{}`", spec.to_string_lossy());
@@ -37,11 +39,19 @@ pub(super) fn typed<'a>(specs: impl Iterator<Item = &'a OsString>) -> Result<Vec
             let expected = format!("NAME=FILE where NAME is one of {}", known_names());
             return Err(Error::parameter("map", expected, shown()));
         };
-        if maps.iter().any(|m| m.name == name) {
-            let expected = format!("given once per map, but {name} comes twice");
-            return Err(Error::parameter("map", expected, shown()));
+        match maps.iter_mut().find(|m| m.name == name) {
+            None => maps.push(Wanted { name, paths: vec![path], kind, found: false }),
+            Some(map) => map.paths.push(path),
         }
-        maps.push(Wanted { name, path, kind, found: false });
+    }
+    if let Some(Wanted { name, paths, .. }) = maps.iter().find(|m| m.paths.len() != n_photos) {
+        let times = |n: usize| match n {
+            1 => "once".to_owned(),
+            2 => "twice".to_owned(),
+            n => format!("{n} times"),
+        };
+        let expected = format!("given once for each photo, so {name} {}", times(n_photos));
+        return Err(Error::parameter("map", expected, times(paths.len())));
     }
     Ok(maps)
 }
@@ -72,24 +82,6 @@ fn split_os(spec: &OsStr) -> Option<(String, OsString)> {
     Some((name.to_owned(), path.into()))
 }
 
-/// Fails unless a map of this size can follow a source map of a photo of that size.
-///
-/// The rule is [`SourceMap::apply`]'s own: one pixel is gathered.
-pub(super) fn ensure_fits(map: &Picture, photo: &Picture, wanted: &Wanted) -> Result<()> {
-    let probe = SourceMap::new((1, 1), (photo.height(), photo.width()), vec![[0, 0]])?;
-    probe.apply(map, wanted.kind).map(|_| ()).map_err(|error| match error {
-        Error::SizeMismatch { got_w, got_h, want_w, want_h, remedy, .. } => Error::SizeMismatch {
-            what: format!("the map `{}` ({})", wanted.name, wanted.path.display()),
-            got_w,
-            got_h,
-            want_w,
-            want_h,
-            remedy,
-        },
-        other => other,
-    })
-}
-
 /// Where a map of `tile` goes: `brick.png` and `normal` make `brick_normal.png`, and so does
 /// `brick_basecolor.png`. Integers become PNG, floats EXR, as both keep every bit.
 pub(super) fn output_path(tile: &Path, name: &str, map: &Picture) -> PathBuf {
@@ -111,13 +103,13 @@ mod tests {
 
     fn specs(specs: &[&str]) -> Result<Vec<Wanted>> {
         let specs: Vec<OsString> = specs.iter().map(Into::into).collect();
-        typed(specs.iter())
+        typed(specs.iter(), 1)
     }
 
     #[test]
     fn the_first_equals_sign_splits() {
         let maps = specs(&["normal=a=b.png", "roughness=r.png"]).expect("maps");
-        assert_eq!(maps[0].path, Path::new("a=b.png"));
+        assert_eq!(maps[0].paths, [Path::new("a=b.png")]);
         assert_eq!((maps[0].kind, maps[1].kind), (MapKind::Normal, MapKind::Data));
     }
 
@@ -131,15 +123,14 @@ mod tests {
     }
 
     #[test]
-    fn a_map_of_another_shape_is_named() {
-        let of = |h, w| {
-            Picture::new(h, w, 1, Samples::U8(vec![0; h * w]), Encoding::Data).expect("picture")
-        };
-        let wanted = &specs(&["height=h.png"]).expect("map")[0];
-        assert!(ensure_fits(&of(12, 16), &of(6, 8), wanted).is_ok(), "twice as large");
-        let error = ensure_fits(&of(16, 12), &of(6, 8), wanted).expect_err("upright");
-        assert!(matches!(error, Error::SizeMismatch { got_w: 12, want_w: 8, .. }), "{error}");
-        assert!(error.to_string().contains("`height` (h.png)"), "{error}");
+    fn every_photo_has_its_map() {
+        let all = ["normal_gl=a.png", "height=h.png", "nor_gl=b.png", "height=i.png"];
+        let all: Vec<OsString> = all.iter().map(Into::into).collect();
+        let maps = typed(all.iter(), 2).expect("maps");
+        assert_eq!(maps[0].paths, [Path::new("a.png"), Path::new("b.png")]);
+        assert_eq!(maps[1].paths, [Path::new("h.png"), Path::new("i.png")]);
+        let error = typed(all[..3].iter(), 2).expect_err("one height").to_string();
+        assert!(error.contains("so height twice, got once"), "{error}");
     }
 
     #[test]

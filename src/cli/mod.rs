@@ -13,6 +13,7 @@ mod preview;
 mod show;
 mod small;
 pub mod study;
+mod summary;
 mod tile;
 mod work;
 

@@ -13,7 +13,7 @@ use crate::cli::work::{Session, supervise, watch_signals};
 use crate::cli::{args, files};
 use crate::image::material::MapKind;
 use crate::image::picture::{Encoding, Picture};
-use crate::verb::tile::TileParams;
+use crate::verb::params::TileParams;
 
 /// Version of what `--json` writes; goes up when a field changes its meaning or goes away.
 pub(super) const SCHEMA_VERSION: u32 = 1;

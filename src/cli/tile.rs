@@ -1,87 +1,55 @@
 //! `texforge tile`.
 
-use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 use clap::ArgMatches;
-use serde::{Serialize, Serializer};
 
 use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
-use crate::base::params::Value;
 use crate::cli::maps::{self, Wanted};
 use crate::cli::output::{Target, to_stdout};
-use crate::cli::show::duration;
-use crate::cli::small::{SCHEMA_VERSION, print_json, typed};
+use crate::cli::small::print_json;
+use crate::cli::summary::{self, Summary, Written};
 use crate::cli::work::{Session, supervise, watch_signals};
 use crate::cli::{args, files, preview};
 use crate::image::mask::Mask;
 use crate::image::material::{MapKind, Sibling};
 use crate::image::picture::Picture;
 use crate::image::sigma_map::SigmaMap;
-use crate::verb::tile::{
-    Costs, Guides, Measure, Method, Report, Size, Tile, TileParams, tile_guided,
-};
+use crate::verb::inputs::Inputs;
+use crate::verb::params::{Method, TileParams};
+use crate::verb::tile::{Tile, tiles};
 
 /// What was typed, checked as far as it can be without looking at a file.
 #[derive(Debug)]
 struct Request {
-    photo: PathBuf,
-    target: Target,
+    /// The photo and those mixed with it.
+    photos: Vec<PathBuf>,
+    /// Where each tile goes.
+    places: Vec<Place>,
     params: TileParams,
     mask: Option<PathBuf>,
+    avoid: Option<PathBuf>,
     sigma_map: Option<PathBuf>,
     maps: Vec<Wanted>,
     pick_up: bool,
-    source_map: Option<PathBuf>,
-    preview: Option<PathBuf>,
     force: bool,
 }
 
-/// A file that the run writes.
-#[derive(Debug, Serialize)]
-struct Written {
-    role: &'static str,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    name: Option<String>,
-    path: String,
-    width: usize,
-    height: usize,
+/// Where a tile and what belongs to it goes.
+#[derive(Debug)]
+struct Place {
+    tile: Target,
+    source_map: Option<PathBuf>,
+    preview: Option<PathBuf>,
 }
 
-/// The `--json` object.
-#[derive(Debug, Serialize)]
-struct Summary {
-    schema_version: u32,
-    verb: &'static str,
-    version: &'static str,
-    seed: u64,
-    threads: usize,
-    params: BTreeMap<&'static str, serde_json::Value>,
-    photo: Written,
-    tile: Written,
-    costs: Costs,
-    seconds: Seconds,
-    files: Vec<Written>,
-    notes: Vec<String>,
-}
-
-#[derive(Debug, Serialize)]
-struct Seconds {
-    /// In the order of the work.
-    #[serde(serialize_with = "in_order")]
-    stages: Vec<(&'static str, f64)>,
-    total: f64,
-}
-
-/// Pairs as one JSON object that keeps their order.
-fn in_order<S: Serializer>(
-    pairs: &[(&'static str, f64)],
-    to: S,
-) -> std::result::Result<S::Ok, S::Error> {
-    to.collect_map(pairs.iter().copied())
+impl Place {
+    /// The file of a map of the tile.
+    fn map(&self, name: &str, map: &Picture) -> PathBuf {
+        maps::output_path(self.tile.file().unwrap_or(Path::new("tile.png")), name, map)
+    }
 }
 
 /// Runs `texforge tile`.
@@ -92,11 +60,12 @@ pub(super) fn run(matches: &ArgMatches) -> Result<()> {
     let request = Request::typed(matches)?;
     let seed = matches.get_one("seed").copied().unwrap_or_default();
     let threads = matches.get_one("threads").copied().unwrap_or_default();
+    // Before the first thread: whoever sees that one may send a signal.
+    watch_signals();
     let ctx = Ctx::new(seed, threads)?;
     let session = Session::new(ctx.job(), matches.get_flag("quiet"));
-    watch_signals();
-    let (summary, line) = supervise(&session, move |session| work(session, &ctx, &request))?;
-    session.console.say(&line);
+    let (summary, lines) = supervise(&session, move |session| work(session, &ctx, &request))?;
+    lines.iter().for_each(|line| session.console.say(line));
     if matches.get_flag("json") { print_json(&summary) } else { Ok(()) }
 }
 
@@ -105,15 +74,20 @@ impl Request {
         let path = |id| matches.get_one::<PathBuf>(id).cloned();
         let params = args::tile_params(matches)?;
         let target = Target::typed(&path("output").unwrap_or_default())?;
-        let maps = maps::typed(matches.get_many::<OsString>("map").into_iter().flatten())?;
+        let mut photos = vec![path("photo").unwrap_or_default()];
+        photos.extend(matches.get_many::<PathBuf>("also").into_iter().flatten().cloned());
+        let maps = matches.get_many::<OsString>("map").into_iter().flatten();
+        let maps = maps::typed(maps, photos.len())?;
         let source_map = path("save-source-map");
         let wants = |flag| matches.get_flag(flag);
+        let count = matches.get_one::<usize>("variants").copied().unwrap_or(1);
         // Name what contradicts what, before any file is touched.
-        let preview = match (&target, wants("preview")) {
-            (_, false) => None,
-            (Target::File(tile), true) => Some(tile.with_extension("preview.png")),
-            (Target::Stdout, true) => return Err(needs_file("preview")),
-        };
+        if target == Target::Stdout && wants("preview") {
+            return Err(needs_file("preview"));
+        }
+        if target == Target::Stdout && count > 1 {
+            return Err(needs_file("variants"));
+        }
         if target == Target::Stdout && !maps.is_empty() {
             return Err(needs_file("map"));
         }
@@ -125,182 +99,218 @@ impl Request {
             return Err(Error::parameter("method", expected, "`make-seamless`, which blends"));
         }
         Ok(Self {
-            photo: path("photo").unwrap_or_default(),
+            photos,
             pick_up: !wants("no-maps")
                 && target != Target::Stdout
                 && params.method != Method::MakeSeamless,
-            target,
+            places: places(&target, source_map.as_deref(), wants("preview"), count),
             params,
             mask: path("mask"),
+            avoid: path("avoid"),
             sigma_map: path("sigma-map"),
             maps,
-            source_map,
-            preview,
             force: wants("force"),
         })
     }
 
     fn inputs(&self) -> Vec<&Path> {
-        let maps = self.maps.iter().map(|m| m.path.as_path());
-        let guides = self.mask.as_deref().into_iter().chain(self.sigma_map.as_deref());
-        maps.chain([self.photo.as_path()]).chain(guides).collect()
+        let maps = self.maps.iter().flat_map(|m| &m.paths);
+        maps.chain(&self.photos)
+            .chain(&self.mask)
+            .chain(&self.avoid)
+            .chain(&self.sigma_map)
+            .map(PathBuf::as_path)
+            .collect()
     }
 
     /// Fails if an output cannot be written, or two outputs are the same file.
-    fn check_outputs(&self, maps: &[Output]) -> Result<()> {
-        let tile = self.target.file().map(|p| ("output", p));
-        let source_map = self.source_map.as_deref().map(|p| ("save-source-map", p));
-        let preview = self.preview.as_deref().map(|p| ("preview", p));
+    fn check_outputs(&self, maps: &[Input]) -> Result<()> {
         let mut inputs = self.inputs();
-        inputs.extend(maps.iter().map(|m| m.wanted.path.as_path()));
-        let maps = maps.iter().map(|m| ("map", m.to.as_path()));
+        inputs.extend(maps.iter().flat_map(|m| &m.wanted.paths).map(PathBuf::as_path));
         let mut seen: Vec<PathBuf> = Vec::new();
-        for (flag, path) in tile.into_iter().chain(source_map).chain(preview).chain(maps) {
-            files::check_place(path, &inputs, self.force)?;
-            let place = std::path::absolute(path).map_err(Error::io("write", path))?;
-            if seen.contains(&place) {
-                let got = format!("{} twice", path.display());
-                return Err(Error::parameter(flag, "a file of its own for each output", got));
+        for place in &self.places {
+            let tile = place.tile.file().map(|p| ("output", p.to_owned()));
+            let source_map = place.source_map.clone().map(|p| ("save-source-map", p));
+            let preview = place.preview.clone().map(|p| ("preview", p));
+            let maps = maps.iter().map(|m| ("map", place.map(m.wanted.name, &m.pictures[0])));
+            for (flag, path) in tile.into_iter().chain(source_map).chain(preview).chain(maps) {
+                files::check_place(&path, &inputs, self.force)?;
+                let absolute = std::path::absolute(&path).map_err(Error::io("write", &path))?;
+                if seen.contains(&absolute) {
+                    let got = format!("{} twice", path.display());
+                    return Err(Error::parameter(flag, "a file of its own for each output", got));
+                }
+                seen.push(absolute);
             }
-            seen.push(place);
         }
         Ok(())
     }
+}
+
+/// The places of `count` tiles: those that were typed, or numbered ones from 1 on.
+fn places(target: &Target, source_map: Option<&Path>, preview: bool, count: usize) -> Vec<Place> {
+    let place = |i: usize| {
+        let numbered =
+            |path: &Path| if count > 1 { files::numbered(path, i) } else { path.to_owned() };
+        let tile = target.file().map(numbered);
+        Place {
+            preview: tile.as_deref().filter(|_| preview).map(|p| p.with_extension("preview.png")),
+            source_map: source_map.map(numbered),
+            tile: tile.map_or(Target::Stdout, Target::File),
+        }
+    };
+    (1..=count).map(place).collect()
 }
 
 fn needs_file(flag: &'static str) -> Error {
     Error::parameter(flag, "left out when the tile goes to standard output", "`-o -`")
 }
 
-/// A map that was read and has a place to go.
-struct Output {
+/// A map that was read, of each photo.
+struct Input {
     wanted: Wanted,
-    picture: Picture,
-    to: PathBuf,
+    pictures: Vec<Picture>,
 }
 
 /// Everything between the checked command line and the renamed files.
-fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, String)> {
+fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Vec<String>)> {
     // Look at the places before anything is read: the cheapest refusal first.
     request.check_outputs(&[])?;
 
     // Read all inputs and let them prove that they fit together.
-    let photo = files::read(&request.photo, MapKind::Color)?;
+    let mut photo = files::read(&request.photos[0], MapKind::Color)?;
+    let mut also = Vec::new();
+    let mut notes = std::mem::take(&mut photo.meta.notes);
+    for path in &request.photos[1..] {
+        session.check()?;
+        let mut picture = files::read(path, MapKind::Color)?;
+        let shown = path.display();
+        notes.extend(picture.meta.notes.drain(..).map(|note| format!("{shown}: {note}")));
+        also.push(picture);
+    }
     session.check()?;
-    let mut notes: Vec<String> = photo.meta.notes.clone();
-    let mask = match &request.mask {
-        None => None,
-        Some(path) => {
-            let mask = Mask::from_picture(&files::read(path, MapKind::Color)?)?;
-            mask.ensure_size(photo.height(), photo.width())?;
-            Some(mask)
-        }
+    let read_mask = |path: &Option<PathBuf>, what| {
+        let Some(path) = path else { return Ok(None) };
+        let mask = Mask::from_picture(&files::read(path, MapKind::Color)?)?;
+        mask.ensure_size(what, photo.height(), photo.width())?;
+        Ok(Some(mask))
     };
+    let mask = read_mask(&request.mask, "the mask")?;
+    let avoid = read_mask(&request.avoid, "the avoid mask")?;
     let sigma_map = match &request.sigma_map {
         None => None,
         Some(path) => Some(SigmaMap::from_picture(&files::read(path, MapKind::Data)?)?),
     };
-    let maps = read_maps(session, request, &photo, &mut notes)?;
+    let inputs = Inputs {
+        also: &also,
+        mask: mask.as_ref(),
+        avoid: avoid.as_ref(),
+        sigma_map: sigma_map.as_ref(),
+        ..Inputs::new(&photo)
+    };
+    let maps = read_maps(session, request, &inputs, &mut notes)?;
     request.check_outputs(&maps)?;
-    files::ensure_can_hold(&photo, request.target.file(), MapKind::Color)?;
+    files::ensure_can_hold(&photo, request.places[0].tile.file(), MapKind::Color)?;
     session.check()?;
 
     // The long work.
-    let guides = Guides { mask: mask.as_ref(), sigma_map: sigma_map.as_ref(), trace: false };
-    let Tile { picture, source_map, report, .. } =
-        tile_guided(ctx, &photo, guides, &request.params)?;
-    notes.extend(report.notes.iter().cloned());
+    let made = tiles(ctx, &inputs, &request.params, request.places.len())?;
+    notes.extend(made[0].report.notes.iter().cloned());
 
-    // Encode and stage every file; the maps follow the tile.
-    let record = record(&report);
+    // Encode and stage every file; the maps follow the tiles.
     let mut written = Vec::new();
-    let mut stage = |role, name: Option<&str>, path: &Path, bytes: Vec<u8>, picture: &Picture| {
-        session.check()?;
-        session.staging.stage(session, path, &bytes)?;
-        written.push(Written::new(role, name, path, picture.width(), picture.height()));
-        Ok(())
-    };
-    let bytes = files::encode(&picture, request.target.file(), MapKind::Color, Some(&record))?;
-    if let Some(path) = request.target.file() {
-        stage("tile", None, path, bytes.clone(), &picture)?;
-    }
-    if let Some(source_map) = &source_map {
-        for Output { wanted, picture: map, to } in &maps {
-            let map = source_map.apply(map, wanted.kind)?;
-            let bytes = files::encode(&map, Some(to), wanted.kind, None)?;
-            stage("map", Some(wanted.name), to, bytes, &map)?;
+    let mut done = Vec::new();
+    let mut piped = None;
+    for (place, Tile { picture, source_map, report, .. }) in request.places.iter().zip(made) {
+        let mut stage =
+            |role, name: Option<&str>, path: &Path, bytes: Vec<u8>, picture: &Picture| {
+                session.check()?;
+                session.staging.stage(session, path, &bytes)?;
+                let (width, height) = (picture.width(), picture.height());
+                written.push(Written::new(role, name, path, width, height));
+                Ok(())
+            };
+        let record = summary::record(&report);
+        let file = place.tile.file();
+        let bytes = files::encode(&picture, file, MapKind::Color, Some(&record))?;
+        match file {
+            Some(path) => stage("tile", None, path, bytes, &picture)?,
+            None => piped = Some(bytes),
         }
-        if let Some(path) = &request.source_map {
-            stage("source_map", None, path, files::encode_source_map(source_map, path)?, &picture)?;
+        if let Some(source_map) = &source_map {
+            for Input { wanted, pictures } in &maps {
+                let maps: Vec<&Picture> = pictures.iter().collect();
+                let map = source_map.apply_all(&maps, wanted.kind)?;
+                let to = place.map(wanted.name, &map);
+                let bytes = files::encode(&map, Some(&to), wanted.kind, None)?;
+                stage("map", Some(wanted.name), &to, bytes, &map)?;
+            }
+            if let Some(path) = &place.source_map {
+                let bytes = files::encode_source_map(source_map, path)?;
+                stage("source_map", None, path, bytes, &picture)?;
+            }
         }
-    }
-    if let Some(path) = &request.preview {
-        let tiling = preview::tiling(&picture)?;
-        stage(
-            "preview",
-            None,
-            path,
-            files::encode(&tiling, Some(path), MapKind::Color, None)?,
-            &tiling,
-        )?;
+        if let Some(path) = &place.preview {
+            let tiling = preview::tiling(&picture)?;
+            let bytes = files::encode(&tiling, Some(path), MapKind::Color, None)?;
+            stage("preview", None, path, bytes, &tiling)?;
+        }
+        done.push((place.tile.clone(), report));
     }
 
     // All is computed: now the files get their names, all or none.
     session.staging.commit(session, request.force)?;
-    if request.target == Target::Stdout {
+    if let Some(bytes) = piped {
         to_stdout(&bytes)?;
     }
     for file in written.iter().filter(|w| w.role != "tile") {
-        session.console.say(&format!(
-            "{}  {}x{} ({})",
-            file.path,
-            file.width,
-            file.height,
-            file.what()
-        ));
+        let (width, height) = (file.width, file.height);
+        session.console.say(&format!("{}  {width}x{height} ({})", file.path, file.what()));
     }
     for note in &notes {
         session.console.say(&format!("note: {note}"));
     }
     let elapsed = session.console.elapsed();
-    let line = line(request, &report, elapsed);
-    Ok((summary(ctx, request, &report, notes, written, elapsed), line))
+    let line = |(target, report): &_| summary::line(&request.params, target, report, elapsed);
+    let lines = done.iter().map(line).collect();
+    Ok((summary::summary(ctx, &request.photos, &done, notes, written, elapsed), lines))
 }
 
-/// Reads the maps that were typed and those that lie beside the photo. Of the latter, those that
+/// Reads the maps that were typed and those that lie beside the photos. Of the latter, those that
 /// do not fit are left out with a note: nobody asked for them.
 fn read_maps(
     session: &Session,
     request: &Request,
-    photo: &Picture,
+    inputs: &Inputs<'_>,
     notes: &mut Vec<String>,
-) -> Result<Vec<Output>> {
+) -> Result<Vec<Input>> {
     let mut wanted = request.maps.clone();
     if request.pick_up {
-        let taken: Vec<_> = request.inputs().into_iter().map(Path::to_owned).collect();
-        for Sibling { name, kind, path } in files::siblings(&request.photo)? {
-            let taken = taken.iter().any(|taken| same_place(taken, &path));
-            if !taken && !wanted.iter().any(|m| m.name == name) {
-                // Shown as the photo was typed.
-                let path = path.strip_prefix(".").map_or(path.clone(), Path::to_owned);
-                wanted.push(Wanted { name, path, kind, found: true });
-            }
-        }
+        wanted.extend(beside(request, notes)?);
     }
     let mut maps = Vec::new();
     for wanted in wanted {
-        session.check()?;
-        let read = files::read(&wanted.path, wanted.kind).and_then(|map| {
-            map.ensure_finite(&format!("the map `{}`", wanted.name))?;
-            maps::ensure_fits(&map, photo, &wanted)?;
-            Ok(map)
-        });
-        let shown = wanted.path.display().to_string();
-        match read {
-            Ok(picture) => {
-                let tile = request.target.file().unwrap_or(Path::new("tile.png"));
-                let to = maps::output_path(tile, wanted.name, &picture);
-                if wanted.found && same_place(&to, &wanted.path) {
+        let read = || {
+            let mut pictures = Vec::new();
+            for path in &wanted.paths {
+                session.check()?;
+                let map = files::read(path, wanted.kind)?;
+                map.ensure_finite(&format!("the map `{}`", wanted.name))?;
+                pictures.push(map);
+            }
+            let all: Vec<&Picture> = pictures.iter().collect();
+            let name = format!("{} ({})", wanted.name, wanted.paths[0].display());
+            inputs.ensure_maps_fit(&name, &all, wanted.kind, &request.params)?;
+            Ok(pictures)
+        };
+        let shown = wanted.paths[0].display().to_string();
+        match read() {
+            Ok(pictures) => {
+                let own = |place: &Place| {
+                    let to = place.map(wanted.name, &pictures[0]);
+                    wanted.paths.iter().any(|path| same_place(&to, path))
+                };
+                if wanted.found && request.places.iter().any(own) {
                     // What an earlier run made of a map is no map of the photo.
                     notes.push(format!("{shown} was left alone: it is where this tile's map goes"));
                     continue;
@@ -311,8 +321,9 @@ fn read_maps(
                         "{shown}: taken as the photo's {name} map (--no-maps leaves it alone)"
                     ));
                 }
-                maps.push(Output { wanted, picture, to });
+                maps.push(Input { wanted, pictures });
             }
+            Err(error @ Error::Cancelled) => return Err(error),
             Err(error) if wanted.found => notes.push(format!("{shown} was left alone: {error}")),
             Err(error) => return Err(error),
         }
@@ -320,100 +331,36 @@ fn read_maps(
     Ok(maps)
 }
 
+/// The maps that lie beside the photos and were not typed: those that every photo has.
+fn beside(request: &Request, notes: &mut Vec<String>) -> Result<Vec<Wanted>> {
+    let taken: Vec<_> = request.inputs().into_iter().map(Path::to_owned).collect();
+    let mut found: Vec<Vec<Sibling>> = Vec::new();
+    for photo in &request.photos {
+        let mut siblings = files::siblings(photo)?;
+        siblings.retain(|s| {
+            let typed = request.maps.iter().any(|m| m.name == s.name);
+            !typed && !taken.iter().any(|taken| same_place(taken, &s.path))
+        });
+        found.push(siblings);
+    }
+    // Shown as the photo was typed.
+    let shown = |path: &Path| path.strip_prefix(".").unwrap_or(path).to_owned();
+    let mut wanted = Vec::new();
+    for Sibling { name, kind, path } in &found[0] {
+        let of_photo =
+            |all: &Vec<Sibling>| all.iter().find(|s| s.name == *name).map(|s| shown(&s.path));
+        match found.iter().map(of_photo).collect() {
+            Some(paths) => wanted.push(Wanted { name, paths, kind: *kind, found: true }),
+            None => notes.push(format!(
+                "{} was left alone: not every photo has a {name} map",
+                shown(path).display()
+            )),
+        }
+    }
+    Ok(wanted)
+}
+
 /// Whether two paths name the same file, as far as both exist.
 fn same_place(a: &Path, b: &Path) -> bool {
     matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
-}
-
-impl Written {
-    fn new(
-        role: &'static str,
-        name: Option<&str>,
-        path: &Path,
-        width: usize,
-        height: usize,
-    ) -> Self {
-        let path = path.to_string_lossy().into_owned();
-        Self { role, name: name.map(str::to_owned), path, width, height }
-    }
-
-    fn what(&self) -> String {
-        match &self.name {
-            Some(name) => format!("{name} map"),
-            None => self.role.replace('_', " "),
-        }
-    }
-}
-
-/// How the tile was made, for the file itself. Holds nothing that differs between equal runs.
-fn record(report: &Report) -> String {
-    serde_json::json!({
-        "tool": "texforge",
-        "version": report.version,
-        "verb": TileParams::VERB,
-        "seed": report.seed,
-        "params": params(report),
-    })
-    .to_string()
-}
-
-fn params(report: &Report) -> BTreeMap<&'static str, serde_json::Value> {
-    let schema = TileParams::schema();
-    let value = |name: &str, text: &str| match schema.iter().find(|p| p.name == name) {
-        Some(param) => typed(param, text),
-        None => text.into(),
-    };
-    report.params.iter().map(|(name, text)| (*name, value(name, text))).collect()
-}
-
-fn summary(
-    ctx: &Ctx,
-    request: &Request,
-    report: &Report,
-    notes: Vec<String>,
-    files: Vec<Written>,
-    elapsed: Duration,
-) -> Summary {
-    let place = request.target.file().unwrap_or(Path::new("-"));
-    let (photo, tile) = (report.photo_size, report.tile_size);
-    Summary {
-        schema_version: SCHEMA_VERSION,
-        verb: TileParams::VERB,
-        version: report.version,
-        seed: report.seed,
-        threads: ctx.threads(),
-        params: params(report),
-        photo: Written::new("photo", None, &request.photo, photo.0, photo.1),
-        tile: Written::new("tile", None, place, tile.0, tile.1),
-        costs: report.costs,
-        seconds: Seconds { stages: report.seconds.clone(), total: elapsed.as_secs_f64() },
-        files,
-        notes,
-    }
-}
-
-/// The line at the end.
-fn line(request: &Request, report: &Report, elapsed: Duration) -> String {
-    let (w, h) = report.tile_size;
-    let (photo_w, photo_h) = report.photo_size;
-    let why = if request.params.size == Size::Auto {
-        format!(" (default size for a {photo_w}x{photo_h} photo)")
-    } else {
-        String::new()
-    };
-    let place = match &request.target {
-        Target::Stdout => "standard output".into(),
-        Target::File(path) => path.display().to_string(),
-    };
-    let Costs { texture, stationarity, stationarity_by_measure } = report.costs;
-    let texture = texture.map_or(String::new(), |cost| format!("texture cost {cost:.2}, "));
-    let measure = request.params.measure;
-    let by_measure = stationarity_by_measure
-        .filter(|_| measure != Measure::Histogram)
-        .map_or(String::new(), |cost| format!(" (by {}: {cost:.3})", measure.show()));
-    format!(
-        "{place}  {w}x{h}{why}, seed {}, {}, {texture}stationarity cost {stationarity:.2}{by_measure}",
-        report.seed,
-        duration(elapsed),
-    )
 }

@@ -58,21 +58,66 @@ impl Mask {
     /// # Errors
     /// [`Error::SizeMismatch`].
     pub fn and(&self, other: &Self) -> Result<Self> {
-        other.ensure_size(self.height, self.width)?;
+        other.ensure_size("the other mask", self.height, self.width)?;
         let usable = self.usable.iter().zip(&other.usable).map(|(&a, &b)| a && b).collect();
         Ok(Self { height: self.height, width: self.width, usable })
     }
 
-    /// Fails unless the mask has this size.
+    /// Usable wherever no flag of `self` is set within `radius` pixels, as the crow flies: the
+    /// opposite of a mask of marks that are grown by a disc. A radius of 0 only turns the flags
+    /// round.
+    ///
+    /// # Cost
+    /// Linear in the pixels, whatever the radius.
+    #[must_use]
+    pub fn clear_of(&self, radius: usize) -> Self {
+        let (h, w) = (self.height, self.width);
+        // Pixels to the nearest mark of the same column, as far as it matters.
+        let far = radius as u32 + 1;
+        let mut gap = vec![far; h * w];
+        let mut sweep = |rows: &mut dyn Iterator<Item = usize>| {
+            let mut last = vec![far; w];
+            for y in rows {
+                let marks = &self.usable[y * w..][..w];
+                for ((last, gap), &mark) in last.iter_mut().zip(&mut gap[y * w..][..w]).zip(marks) {
+                    *last = if mark { 0 } else { (*last + 1).min(far) };
+                    *gap = (*gap).min(*last);
+                }
+            }
+        };
+        sweep(&mut (0..h));
+        sweep(&mut (0..h).rev());
+        // A mark `gap` rows away hides as much of this row as the disc is wide there.
+        let halves: Vec<usize> =
+            (0..=radius).map(|dy| (radius * radius - dy * dy).isqrt()).collect();
+        let mut usable = vec![true; h * w];
+        for (usable, gap) in usable.chunks_exact_mut(w).zip(gap.chunks_exact(w)) {
+            // How far the marks passed so far still reach, in either direction.
+            let mut hide = |columns: &mut dyn Iterator<Item = usize>| {
+                let mut reach = 0;
+                for x in columns {
+                    let half = halves.get(gap[x] as usize).map_or(0, |half| half + 1);
+                    reach = half.max(reach);
+                    usable[x] &= reach == 0;
+                    reach = reach.saturating_sub(1);
+                }
+            };
+            hide(&mut (0..w));
+            hide(&mut (0..w).rev());
+        }
+        Self { height: h, width: w, usable }
+    }
+
+    /// Fails unless the mask, called `what` in the message, has this size.
     ///
     /// # Errors
     /// [`Error::SizeMismatch`].
-    pub fn ensure_size(&self, height: usize, width: usize) -> Result<()> {
+    pub fn ensure_size(&self, what: &str, height: usize, width: usize) -> Result<()> {
         if (self.height, self.width) == (height, width) {
             return Ok(());
         }
         Err(Error::SizeMismatch {
-            what: "the mask".into(),
+            what: what.to_owned(),
             got_w: self.width,
             got_h: self.height,
             want_w: width,
@@ -100,5 +145,37 @@ impl Mask {
     /// Number of usable pixels.
     pub fn count(&self) -> usize {
         self.usable.iter().filter(|&&u| u).count()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// By definition: every pixel looks at all marks.
+    fn naive(marks: &Mask, radius: usize) -> Vec<bool> {
+        let (h, w) = (marks.height, marks.width);
+        let near = |i: usize, j: usize| {
+            let (dy, dx) = ((i / w).abs_diff(j / w), (i % w).abs_diff(j % w));
+            dy * dy + dx * dx <= radius * radius
+        };
+        (0..h * w).map(|i| !(0..h * w).any(|j| marks.usable[j] && near(i, j))).collect()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(256))]
+        #[test]
+        fn growing_marks_is_what_its_definition_says(
+            (height, width) in (1..24_usize, 1..24_usize),
+            radius in 0..40_usize,
+            share in 0..9_u32,
+            seed: u32,
+        ) {
+            let mark = |i: usize| (i as u32 + 1).wrapping_mul(seed | 1) >> 24 < share;
+            let marks = (0..height * width).map(mark).collect();
+            let marks = Mask::new(height, width, marks).expect("marks");
+            prop_assert_eq!(marks.clear_of(radius).usable, naive(&marks, radius));
+        }
     }
 }

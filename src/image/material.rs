@@ -1,21 +1,46 @@
-//! Maps of a material: what each is, by which names it goes, and how normals are kept unit length.
+//! Maps of a material: what each is, and by which names it goes.
 
 use std::path::{Path, PathBuf};
 
-use crate::base::error::Result;
+use crate::base::error::{Error, Result};
+use crate::base::params::choice;
 use crate::image::io::files_beside;
-use crate::image::picture::{Picture, Sample};
-use crate::with_samples;
 
-/// What a map's numbers are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum MapKind {
-    /// Colours (base colour, emission).
-    Color,
-    /// Numbers without a gamma curve (roughness, height, occlusion, ...).
-    Data,
-    /// Unit vectors, stored as `(n + 1) / 2`.
-    Normal,
+choice! {
+    /// What a map's numbers are.
+    pub enum MapKind {
+        /// Colours (base colour, emission).
+        Color = "color",
+        /// Numbers without a gamma curve (roughness, height, occlusion, ...).
+        Data = "data",
+        /// Unit vectors, stored as `(n + 1) / 2`; nobody knows whether green points up or down.
+        Normal = "normal",
+        /// Normals whose green points up (OpenGL).
+        NormalGl = "normal_gl",
+        /// Normals whose green points down (DirectX).
+        NormalDx = "normal_dx",
+    }
+}
+
+impl MapKind {
+    /// Whether the numbers are vectors.
+    pub fn is_normal(self) -> bool {
+        matches!(self, Self::Normal | Self::NormalGl | Self::NormalDx)
+    }
+
+    /// Fails for normals of unknown handedness where photos are `turned` by a quarter: red and green
+    /// change places, and the signs depend on it. (Mirrors and half turns need not know.)
+    ///
+    /// # Errors
+    /// [`Error::Parameter`].
+    pub fn ensure_turnable(self, turned: bool) -> Result<()> {
+        if !turned || self != Self::Normal {
+            return Ok(());
+        }
+        let expected = "normal_gl (green points up) or normal_dx (down) for a map of normals that \
+                        is turned, by its name or its kind";
+        Err(Error::parameter("map", expected, "`normal`"))
+    }
 }
 
 /// A map that materials are made of, and the endings by which files say so.
@@ -36,7 +61,7 @@ impl MapName {
     /// Every map that is known. Normal maps of the two conventions (the sign of green) are maps of
     /// their own; a plain `normal` does not say which it is, and nobody guesses.
     pub const ALL: [Self; 14] = {
-        use MapKind::{Color, Data, Normal};
+        use MapKind::{Color, Data, Normal, NormalDx, NormalGl};
         const fn map(
             name: &'static str,
             kind: MapKind,
@@ -57,8 +82,8 @@ impl MapName {
             map("height", Data, &["height", "displacement", "disp", "bump"]),
             map("metallic", Data, &["metallic", "metal", "metalness"]),
             map("normal", Normal, &["normal", "normals", "nrm", "nor", "norm"]),
-            map("normal_dx", Normal, &["normaldx", "nordx", "nrmdx", "normaldirectx"]),
-            map("normal_gl", Normal, &["normalgl", "norgl", "nrmgl", "normalopengl"]),
+            map("normal_dx", NormalDx, &["normaldx", "nordx", "nrmdx", "normaldirectx"]),
+            map("normal_gl", NormalGl, &["normalgl", "norgl", "nrmgl", "normalopengl"]),
             map("opacity", Data, &["opacity", "alpha"]),
             map("orm", Data, &["orm"]),
             map("roughness", Data, &["roughness", "rough"]),
@@ -71,7 +96,7 @@ impl MapName {
     }
 }
 
-/// The map that a file is by the last words of its name, e.g. `("normal_gl", Normal)` for
+/// The map that a file is by the last words of its name, e.g. `("normal_gl", NormalGl)` for
 /// `Foo_NormalGL.jpg`, `foo_normal_gl.png` and `foo_nor_gl_4k.exr`. Words are separated by
 /// `_`, `-`, `.` or blanks; sizes and formats (`4k`, `2048`, `png`) may follow.
 pub fn classify(file_name: &str) -> Option<(&'static str, MapKind)> {
@@ -166,65 +191,18 @@ pub fn siblings(photo: &Path) -> Result<Vec<Sibling>> {
     Ok(found)
 }
 
-/// Gives every normal unit length. Vectors whose length is unit but for the rounding of their
-/// storage keep their bits, so the function is idempotent; so do vectors that are zero but for
-/// that rounding (undefined normals) and those with NaN.
-///
-/// The first three channels are the vector; others pass through.
-///
-/// # Errors
-/// None at present; the signature leaves room for pictures that cannot be normals.
-pub fn renormalize(picture: Picture) -> Result<Picture> {
-    let (h, w, c) = (picture.height(), picture.width(), picture.channels());
-    if c < 3 {
-        return Ok(picture);
-    }
-    let samples = with_samples!(picture.samples(), v => {
-        let mut v = v.clone();
-        v.chunks_exact_mut(c).for_each(renormalize_pixel);
-        Sample::wrap(v)
-    });
-    picture.with_samples(h, w, c, samples)
-}
-
-/// Distance of neighbouring values of the type in its upper half range.
-fn storage_step<T: Sample>() -> f64 {
-    match size_of::<T>() {
-        _ if T::SCALE > 1.0 => 1.0 / T::SCALE,
-        2 => 1.0 / 2048.0,
-        _ => 1e-6,
-    }
-}
-
-fn renormalize_pixel<T: Sample>(pixel: &mut [T]) {
-    let n: [f64; 3] = std::array::from_fn(|k| pixel[k].to_unit() * 2.0 - 1.0);
-    let length = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
-    // Rounding moves a stored component by half a step at most, so a component of the vector by
-    // one, and the length by sqrt(3).
-    let rounding = 2.0 * storage_step::<T>();
-    if !length.is_finite() || length <= rounding || (length - 1.0).abs() <= rounding {
-        return;
-    }
-    for k in 0..3 {
-        pixel[k] = T::from_unit(f64::midpoint(n[k] / length, 1.0));
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::image::picture::{Encoding, Samples};
-    use half::f16;
-    use proptest::prelude::*;
 
     #[test]
     fn names_are_classified_by_their_last_words() {
-        use MapKind::{Color, Data, Normal};
+        use MapKind::{Color, Data, Normal, NormalDx, NormalGl};
         for (file, want) in [
-            ("foo_normal_gl.png", Some(("normal_gl", Normal))),
-            ("Foo_NormalGL.jpg", Some(("normal_gl", Normal))),
-            ("foo_nor_gl_4k.exr", Some(("normal_gl", Normal))),
-            ("normal_dx.jpg", Some(("normal_dx", Normal))),
+            ("foo_normal_gl.png", Some(("normal_gl", NormalGl))),
+            ("Foo_NormalGL.jpg", Some(("normal_gl", NormalGl))),
+            ("foo_nor_gl_4k.exr", Some(("normal_gl", NormalGl))),
+            ("normal_dx.jpg", Some(("normal_dx", NormalDx))),
             ("foo-nrm.png", Some(("normal", Normal))),
             ("ground054_2K_Color.jpg", Some(("basecolor", Color))),
             ("Ground054_2K-JPG_Displacement.jpg", Some(("height", Data))),
@@ -327,64 +305,5 @@ mod tests {
         assert_eq!(found(&files, "photo.jpg"), pairs(&[("normal", "photo_normal.png")]));
         assert_eq!(found(&["rusty_metal.jpg", "rusty_rough.jpg"], "rusty_metal.jpg"), []);
         assert_eq!(found(&["a.jpg", "b_normal.jpg"], "a.jpg"), []);
-    }
-
-    fn length(pixel: &[f64]) -> f64 {
-        pixel.iter().map(|v| (v * 2.0 - 1.0).powi(2)).sum::<f64>().sqrt()
-    }
-
-    fn check<T: Sample + std::fmt::Debug>(pixel: [f64; 3]) {
-        let stored: Vec<T> = pixel.iter().map(|v| T::from_unit(*v)).collect();
-        let units = |s: &Samples| (0..3).map(|i| s.unit(i)).collect::<Vec<f64>>();
-        let before = T::wrap(stored);
-        let picture = Picture::new(1, 1, 3, before.clone(), Encoding::Data).expect("picture");
-        let once = renormalize(picture).expect("once");
-        let step = 2.0 * storage_step::<T>();
-        if length(&units(&before)) > step {
-            let after = length(&units(once.samples()));
-            assert!((after - 1.0).abs() <= step, "length {after}");
-        } else {
-            assert_eq!(once.samples(), &before, "undefined normals stay");
-        }
-        let twice = renormalize(once.clone()).expect("twice");
-        assert_eq!(once, twice, "unit vectors keep their bits");
-    }
-
-    proptest! {
-        #[test]
-        fn normals_come_out_with_unit_length(x in 0.0..=1.0, y in 0.0..=1.0, z in 0.0..=1.0) {
-            let pixel = [x, y, z];
-            check::<u8>(pixel);
-            check::<u16>(pixel);
-            check::<f16>(pixel);
-            check::<f32>(pixel);
-            check::<f64>(pixel);
-        }
-
-        #[test]
-        fn stored_unit_vectors_keep_their_bits(a in 0.0..std::f64::consts::TAU, z in -1.0..=1.0_f64) {
-            let r = (1.0 - z * z).sqrt();
-            let n = [r * a.cos(), r * a.sin(), z].map(|v| f64::midpoint(v, 1.0));
-            let bits = n.map(u8::from_unit).to_vec();
-            let picture = Picture::new(1, 1, 3, Samples::U8(bits.clone()), Encoding::Data).expect("u8");
-            prop_assert_eq!(renormalize(picture).expect("u8").into_samples(), Samples::U8(bits));
-            let bits = n.map(f16::from_f64).to_vec();
-            let picture = Picture::new(1, 1, 3, Samples::F16(bits.clone()), Encoding::Data).expect("f16");
-            prop_assert_eq!(renormalize(picture).expect("f16").into_samples(), Samples::F16(bits));
-        }
-    }
-
-    #[test]
-    fn undefined_and_further_channels_pass() {
-        let v = vec![128, 128, 128, 7, 127, 128, 127, 8, 255, 255, 128, 9];
-        let picture = Picture::new(1, 3, 4, Samples::U8(v), Encoding::Data).expect("picture");
-        let want = vec![128, 128, 128, 7, 127, 128, 127, 8, 218, 218, 128, 9];
-        assert_eq!(renormalize(picture).expect("run").into_samples(), Samples::U8(want));
-        let nan = Samples::F32(vec![f32::NAN, 0.5, 1.0]);
-        let picture = Picture::new(1, 1, 3, nan, Encoding::Data).expect("picture");
-        let Samples::F32(out) = renormalize(picture).expect("run").into_samples() else {
-            panic!("type kept")
-        };
-        assert!(out[0].is_nan() && out[1..] == [0.5, 1.0]);
     }
 }

@@ -4,6 +4,8 @@ pub mod color;
 pub mod io;
 pub mod mask;
 pub mod material;
+pub mod normals;
 pub mod picture;
 pub mod sigma_map;
 pub mod sourcemap;
+pub mod symmetry;

@@ -55,6 +55,8 @@ pub trait Sample: Copy + Send + Sync + PartialEq + 'static {
     fn from_unit(value: f64) -> Self;
     /// Wraps a vector of this type.
     fn wrap(samples: Vec<Self>) -> Samples;
+    /// The samples, if they are of this type.
+    fn slice(samples: &Samples) -> Option<&[Self]>;
 }
 
 macro_rules! integer_sample {
@@ -71,6 +73,9 @@ macro_rules! integer_sample {
             }
             fn wrap(samples: Vec<Self>) -> Samples {
                 Samples::$variant(samples)
+            }
+            fn slice(samples: &Samples) -> Option<&[Self]> {
+                if let Samples::$variant(v) = samples { Some(v) } else { None }
             }
         }
     };
@@ -92,6 +97,9 @@ macro_rules! float_sample {
             }
             fn wrap(samples: Vec<Self>) -> Samples {
                 Samples::$variant(samples)
+            }
+            fn slice(samples: &Samples) -> Option<&[Self]> {
+                if let Samples::$variant(v) = samples { Some(v) } else { None }
             }
         }
     };
@@ -272,6 +280,31 @@ impl Picture {
             None => Ok(()),
             Some((y, x)) => Err(Error::NotFinite { what: what.to_owned(), count, y, x }),
         }
+    }
+
+    /// Fails unless this picture, called `what` in the message, has the sample type, the channels,
+    /// the encoding and the colour profile of `first`.
+    ///
+    /// # Errors
+    /// [`Error::BadPicture`].
+    pub fn ensure_like(&self, first: &Self, what: &str) -> Result<()> {
+        let shown = |p: &Self| {
+            let encoding = match p.encoding {
+                Encoding::Srgb => "sRGB",
+                Encoding::Linear => "linear light",
+                Encoding::Data => "data",
+            };
+            format!("{} of {} channels, {encoding}", p.samples.dtype(), p.channels)
+        };
+        let (own, wanted) = (shown(self), shown(first));
+        let reason = if own != wanted {
+            format!("it is {own}, the first is {wanted}; convert one of them")
+        } else if self.meta.icc != first.meta.icc {
+            "its colour profile is not that of the first; convert both to sRGB".to_owned()
+        } else {
+            return Ok(());
+        };
+        Err(Error::BadPicture { what: what.to_owned(), reason })
     }
 
     /// The same picture with other samples of any size and type; encoding and meta are kept.

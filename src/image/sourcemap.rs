@@ -2,42 +2,80 @@
 
 use crate::base::error::{Error, Result};
 use crate::image::material::MapKind;
-use crate::image::picture::{Picture, Sample};
+use crate::image::normals::{renormalize, turn_normals};
+use crate::image::picture::{Picture, Sample, Samples};
+use crate::image::symmetry::Symmetry;
 use crate::with_samples;
+
+/// The photo that a pixel was copied from, and how that photo was laid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Origin {
+    /// Which photo, from 0 on.
+    pub photo: u16,
+    /// How it lay: mirrored, turned.
+    pub symmetry: Symmetry,
+}
 
 /// Where every pixel of a texture comes from: the result that all pictures are made of.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SourceMap {
     height: usize,
     width: usize,
-    source_height: usize,
-    source_width: usize,
+    /// Height and width of each photo.
+    sources: Vec<(usize, usize)>,
     yx: Vec<[u32; 2]>,
+    /// One a pixel; empty if every pixel is of the only photo, as it lies.
+    origins: Vec<Origin>,
 }
 
 impl SourceMap {
-    /// A map from its positions `[y, x]`, row by row.
+    /// A map from its positions `[y, x]` in one photo, row by row.
     ///
     /// # Errors
     /// [`Error::BadPicture`] if a side is zero, the number of positions is not `height * width`,
     /// or a position lies outside the source.
     pub fn new(
-        (height, width): (usize, usize),
-        (source_height, source_width): (usize, usize),
+        size: (usize, usize),
+        source_size: (usize, usize),
         yx: Vec<[u32; 2]>,
+    ) -> Result<Self> {
+        Self::of_views(size, vec![source_size], yx, Vec::new())
+    }
+
+    /// A map of size (height, width) from its positions `[y, x]` in photos of these sizes (height,
+    /// width), row by row, and the origin of each. The positions are those in the photo as it is,
+    /// whatever its symmetry. No origins at all mean the only photo, as it lies.
+    ///
+    /// # Errors
+    /// [`Error::BadPicture`], as [`SourceMap::new`], and for origins that do not fit the positions
+    /// or name a photo that is not there.
+    pub fn of_views(
+        (height, width): (usize, usize),
+        sources: Vec<(usize, usize)>,
+        yx: Vec<[u32; 2]>,
+        origins: Vec<Origin>,
     ) -> Result<Self> {
         let bad = |reason| Err(Error::BadPicture { what: "source map".into(), reason });
         if height == 0 || width == 0 || height.checked_mul(width) != Some(yx.len()) {
             return bad(format!("{} positions do not make {width}x{height} pixels", yx.len()));
         }
-        let outside =
-            |p: &&[u32; 2]| p[0] as usize >= source_height || p[1] as usize >= source_width;
-        if let Some([y, x]) = yx.iter().find(outside) {
-            return bad(format!(
-                "position row {y}, column {x} lies outside its {source_width}x{source_height} source"
-            ));
+        let one = origins.is_empty() && sources.len() == 1;
+        if !one && origins.len() != yx.len() {
+            return bad(format!("{} origins for {} positions", origins.len(), yx.len()));
         }
-        Ok(Self { height, width, source_height, source_width, yx })
+        let map = Self { height, width, sources, yx, origins };
+        for (i, &[y, x]) in map.yx.iter().enumerate() {
+            let photo = usize::from(map.origin(i).photo);
+            let Some(&(h, w)) = map.sources.get(photo) else {
+                return bad(format!("photo {} of {} is not there", photo + 1, map.sources.len()));
+            };
+            if y as usize >= h || x as usize >= w {
+                return bad(format!(
+                    "position row {y}, column {x} lies outside its {w}x{h} source"
+                ));
+            }
+        }
+        Ok(map)
     }
 
     /// Height of the output in pixels.
@@ -50,9 +88,14 @@ impl SourceMap {
         self.width
     }
 
-    /// Height and width of the source in pixels.
+    /// Height and width of the (first) source in pixels.
     pub fn source_size(&self) -> (usize, usize) {
-        (self.source_height, self.source_width)
+        self.sources[0]
+    }
+
+    /// Height and width of every source in pixels.
+    pub fn source_sizes(&self) -> &[(usize, usize)] {
+        &self.sources
     }
 
     /// The positions `[y, x]`, row by row.
@@ -60,78 +103,126 @@ impl SourceMap {
         &self.yx
     }
 
-    /// Gathers `map` through the source map: output pixel (y, x) is the map's pixel at
-    /// `positions()[y * width + x]`, bit for bit.
-    ///
-    /// A map of another size than the source (but the same shape) is read bilinearly at the
-    /// corresponding places. Normal maps ([`MapKind::Normal`]) come out with unit length.
+    /// The origins, row by row; `None` if every pixel is of the only photo, as it lies.
+    pub fn origins(&self) -> Option<&[Origin]> {
+        (!self.origins.is_empty()).then_some(&self.origins)
+    }
+
+    /// The origin of output pixel `i`.
+    #[inline]
+    pub fn origin(&self, i: usize) -> Origin {
+        self.origins.get(i).copied().unwrap_or_default()
+    }
+
+    /// Gathers `map` through the source map of one photo: see [`SourceMap::apply_all`].
     ///
     /// # Errors
-    /// [`Error::SizeMismatch`] if the map's aspect ratio is not the source's.
+    /// As [`SourceMap::apply_all`].
     pub fn apply(&self, map: &Picture, kind: MapKind) -> Result<Picture> {
-        let (h, w, c) = (map.height(), map.width(), map.channels());
-        // One pixel of rounding is allowed, as resizing leaves it.
-        let same_shape = (h * self.source_width).abs_diff(w * self.source_height)
-            <= self.source_width.max(self.source_height);
-        if !same_shape {
-            return Err(Error::SizeMismatch {
-                what: "the map".into(),
-                got_w: w,
-                got_h: h,
-                want_w: self.source_width,
-                want_h: self.source_height,
-                remedy: "a map must show the same picture as the photo the source map was made \
-                         from, at any resolution but the same aspect ratio"
-                    .into(),
-            });
+        self.apply_all(&[map], kind)
+    }
+
+    /// Gathers maps, one of each photo, through the source map: output pixel (y, x) is the pixel at
+    /// `positions()[y * width + x]` of its photo's map, bit for bit.
+    ///
+    /// A map of another size than its source (but the same shape) is read bilinearly at the
+    /// corresponding places. Normals are mirrored and turned with the photo, and come out with unit
+    /// length.
+    ///
+    /// # Errors
+    /// [`Error::SizeMismatch`] if a map's aspect ratio is not its source's; [`Error::BadPicture`] if
+    /// there is not one map a photo or they differ in type; [`Error::Parameter`] for
+    /// [`MapKind::Normal`] where a photo was turned by a quarter: there one has to know which way
+    /// green points.
+    pub fn apply_all(&self, maps: &[&Picture], kind: MapKind) -> Result<Picture> {
+        self.ensure_maps_fit(maps)?;
+        let turned = self.origins.iter().any(|o| o.symmetry.swaps_axes());
+        kind.ensure_turnable(turned)?;
+        let samples = with_samples!(maps[0].samples(), v => gathered(self, v, maps));
+        let first = maps[0];
+        let out = first.with_samples(self.height, self.width, first.channels(), samples)?;
+        if !kind.is_normal() {
+            return Ok(out);
         }
-        let same_size = (h, w) == self.source_size();
-        let samples = with_samples!(map.samples(), v => if same_size {
-            gather(&self.yx, v, w, c)
+        renormalize(if self.origins.is_empty() {
+            out
         } else {
-            gather_bilinear(&self.yx, v, (h, w, c), self.source_size())
-        });
-        let out = map.with_samples(self.height, self.width, c, samples)?;
-        if kind == MapKind::Normal { crate::image::material::renormalize(out) } else { Ok(out) }
+            turn_normals(&out, kind, |i| self.origins[i].symmetry)?
+        })
+    }
+
+    fn ensure_maps_fit(&self, maps: &[&Picture]) -> Result<()> {
+        if maps.len() != self.sources.len() {
+            let reason = format!(
+                "{} given, {} needed: one for each photo, in their order",
+                maps.len(),
+                self.sources.len()
+            );
+            return Err(Error::BadPicture { what: "the maps".into(), reason });
+        }
+        for (i, (map, &(sh, sw))) in maps.iter().zip(&self.sources).enumerate() {
+            let what = if i == 0 { "the map".to_owned() } else { format!("map {}", i + 1) };
+            let (h, w) = (map.height(), map.width());
+            // One pixel of rounding is allowed, as resizing leaves it.
+            if (h * sw).abs_diff(w * sh) > sw.max(sh) {
+                return Err(Error::SizeMismatch {
+                    what,
+                    got_w: w,
+                    got_h: h,
+                    want_w: sw,
+                    want_h: sh,
+                    remedy: "a map must show the same picture as the photo the source map was \
+                             made from, at any resolution but the same aspect ratio"
+                        .into(),
+                });
+            }
+            map.ensure_like(maps[0], &what)?;
+        }
+        Ok(())
     }
 }
 
-fn gather<T: Sample>(
-    yx: &[[u32; 2]],
-    v: &[T],
-    w: usize,
-    c: usize,
-) -> crate::image::picture::Samples {
-    let mut out = Vec::with_capacity(yx.len() * c);
-    for &[y, x] in yx {
-        let at = (y as usize * w + x as usize) * c;
-        out.extend_from_slice(&v[at..at + c]);
+/// The samples of every output pixel. `first` are those of the first map and say the type.
+fn gathered<T: Sample>(source_map: &SourceMap, first: &[T], maps: &[&Picture]) -> Samples {
+    let c = maps[0].channels();
+    let slices: Vec<&[T]> = maps.iter().map(|m| T::slice(m.samples()).unwrap_or(first)).collect();
+    let same_size = |(m, &size): (&&Picture, &(usize, usize))| (m.height(), m.width()) == size;
+    let same_size: Vec<bool> = maps.iter().zip(&source_map.sources).map(same_size).collect();
+    let mut out = Vec::with_capacity(source_map.yx.len() * c);
+    for (i, &[y, x]) in source_map.yx.iter().enumerate() {
+        let photo = usize::from(source_map.origin(i).photo);
+        let (v, w) = (slices[photo], maps[photo].width());
+        if same_size[photo] {
+            let at = (y as usize * w + x as usize) * c;
+            out.extend_from_slice(&v[at..at + c]);
+        } else {
+            let size = (maps[photo].height(), w, c);
+            push_bilinear(&mut out, v, size, (y, x), source_map.sources[photo]);
+        }
     }
     T::wrap(out)
 }
 
-fn gather_bilinear<T: Sample>(
-    yx: &[[u32; 2]],
+/// Reads a map at the place that corresponds to a pixel of its source.
+fn push_bilinear<T: Sample>(
+    out: &mut Vec<T>,
     v: &[T],
     (h, w, c): (usize, usize, usize),
+    (y, x): (u32, u32),
     (sh, sw): (usize, usize),
-) -> crate::image::picture::Samples {
+) {
     // Pixel centres correspond: (p + 0.5) / source = (q + 0.5) / map.
     let place = |p: u32, n: usize, source: usize| {
         let q = ((p as f64 + 0.5) * n as f64 / source as f64 - 0.5).clamp(0.0, (n - 1) as f64);
         let low = q as usize;
         (low, (low + 1).min(n - 1), q - low as f64)
     };
-    let mut out = Vec::with_capacity(yx.len() * c);
-    for &[y, x] in yx {
-        let (y0, y1, fy) = place(y, h, sh);
-        let (x0, x1, fx) = place(x, w, sw);
-        for k in 0..c {
-            let at = |y: usize, x: usize| v[(y * w + x) * c + k].to_unit();
-            let top = at(y0, x0) * (1.0 - fx) + at(y0, x1) * fx;
-            let bottom = at(y1, x0) * (1.0 - fx) + at(y1, x1) * fx;
-            out.push(T::from_unit(top * (1.0 - fy) + bottom * fy));
-        }
+    let (y0, y1, fy) = place(y, h, sh);
+    let (x0, x1, fx) = place(x, w, sw);
+    for k in 0..c {
+        let at = |y: usize, x: usize| v[(y * w + x) * c + k].to_unit();
+        let top = at(y0, x0) * (1.0 - fx) + at(y0, x1) * fx;
+        let bottom = at(y1, x0) * (1.0 - fx) + at(y1, x1) * fx;
+        out.push(T::from_unit(top * (1.0 - fy) + bottom * fy));
     }
-    T::wrap(out)
 }

@@ -1,4 +1,5 @@
 //! Room 5: the methods, one paper or baseline each.
 
+pub mod flatten;
 pub mod make_seamless;
 pub mod stationary;

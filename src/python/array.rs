@@ -13,7 +13,8 @@ use super::error::IntoPy;
 use crate::base::error::{Error, Result};
 use crate::base::memory;
 use crate::image::picture::{Encoding, Picture, Samples};
-use crate::image::sourcemap::SourceMap;
+use crate::image::sourcemap::{Origin, SourceMap};
+use crate::image::symmetry::Symmetry;
 use crate::with_samples;
 
 /// Fills a new vector of `len` items from the bytes of a buffer.
@@ -94,24 +95,47 @@ fn bytes_out<'py>(py: Python<'py>, bytes: &[u8]) -> PyResult<Bound<'py, PyByteAr
 }
 
 /// A source map from Python: its positions `[y, x]` as a contiguous buffer of 32-bit integers,
-/// (height, width), and the source's (height, width).
+/// (height, width), every source's (height, width), and the origins (photo, symmetry) as another
+/// such buffer, if there are any.
 #[derive(FromPyObject)]
-pub(super) struct MapIn<'py>(Bound<'py, PyAny>, (usize, usize), (usize, usize));
+pub(super) struct MapIn<'py>(
+    Bound<'py, PyAny>,
+    (usize, usize),
+    Vec<(usize, usize)>,
+    Option<Bound<'py, PyAny>>,
+);
 
 impl MapIn<'_> {
     /// The source map, copied.
     pub(super) fn source_map(&self, py: Python<'_>) -> PyResult<SourceMap> {
-        let Self(buffer, (height, width), source_size) = self;
+        let Self(buffer, (height, width), sources, origins) = self;
         let len = product(&[*height, *width]).into_py(py)?;
-        SourceMap::new((*height, *width), *source_size, copied(py, buffer, len)?).into_py(py)
+        let origins: Vec<[u32; 2]> = match origins {
+            Some(origins) => copied(py, origins, len)?,
+            None => Vec::new(),
+        };
+        let origin = |&[photo, code]: &[u32; 2]| {
+            let origin = u16::try_from(photo).ok().zip(Symmetry::from_code(code));
+            origin.map(|(photo, symmetry)| Origin { photo, symmetry }).ok_or_else(|| {
+                let reason = format!("origin ({photo}, {code}) is no photo and symmetry (0 to 7)");
+                Error::BadPicture { what: "source map".into(), reason }
+            })
+        };
+        let origins = origins.iter().map(origin).collect::<Result<_>>().into_py(py)?;
+        let positions = copied(py, buffer, len)?;
+        SourceMap::of_views((*height, *width), sources.clone(), positions, origins).into_py(py)
     }
 }
 
 /// A source map for Python, in the same parts as [`MapIn`].
-pub(super) type MapOut<'py> = (Bound<'py, PyByteArray>, (usize, usize), (usize, usize));
+pub(super) type MapOut<'py> =
+    (Bound<'py, PyByteArray>, (usize, usize), Vec<(usize, usize)>, Option<Bound<'py, PyByteArray>>);
 
 /// The source map, copied into memory that Python owns.
 pub(super) fn map_out<'py>(py: Python<'py>, map: &SourceMap) -> PyResult<MapOut<'py>> {
     let bytes = bytes_out(py, bytemuck::cast_slice(map.positions()))?;
-    Ok((bytes, (map.height(), map.width()), map.source_size()))
+    let origin = |o: &Origin| [u32::from(o.photo), u32::from(o.symmetry.code())];
+    let origins = map.origins().map(|all| all.iter().map(origin).collect::<Vec<_>>());
+    let origins = origins.map(|all| bytes_out(py, bytemuck::cast_slice(&all))).transpose()?;
+    Ok((bytes, (map.height(), map.width()), map.source_sizes().to_vec(), origins))
 }

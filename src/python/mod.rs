@@ -17,113 +17,119 @@ use pyo3::types::{PyBytes, PyDict};
 
 use crate::base::ctx::Ctx;
 use crate::base::error::{Error, ErrorKind, Result};
+use crate::base::params::Value as _;
 use crate::image::io::{self, Format, WriteOptions};
 use crate::image::mask::Mask;
 use crate::image::material::{self, MapKind};
 use crate::image::picture::Picture;
 use crate::image::sigma_map::SigmaMap;
-use crate::image::sourcemap::SourceMap;
+use crate::verb::inputs::Inputs;
+use crate::verb::params::TileParams;
 use crate::verb::texture_cost as measure;
 use crate::verb::texture_cost::TextureCostParams;
-use crate::verb::tile::{Guides, Step, TileParams, tile_guided};
+use crate::verb::tile::{Step, Tile};
 use array::{ArrayIn, ArrayOut, MapIn, MapOut, array_out, map_out};
 use error::IntoPy;
 
-/// A picture of another map of the material: name, picture, what its numbers are.
-type NamedMap<'py> = (String, ArrayIn<'py>, String);
+/// Another map of the material: name, a picture of each photo's, what its numbers are.
+type NamedMap<'py> = (String, Vec<ArrayIn<'py>>, String);
 
 fn kind_named(name: &str) -> Result<MapKind> {
-    match name {
-        "color" => Ok(MapKind::Color),
-        "data" => Ok(MapKind::Data),
-        "normal" => Ok(MapKind::Normal),
-        _ => Err(Error::parameter("kind", "one of color, data, normal", format!("`{name}`"))),
-    }
-}
-
-/// Fails before the long work if `map` could not be gathered after it.
-fn ensure_same_shape(name: &str, map: &Picture, photo: &Picture) -> Result<()> {
-    let probe = SourceMap::new((1, 1), (photo.height(), photo.width()), vec![[0, 0]])?;
-    match probe.apply(map, MapKind::Data) {
-        Err(Error::SizeMismatch { got_w, got_h, want_w, want_h, remedy, .. }) => {
-            let what = format!("the map `{name}`");
-            Err(Error::SizeMismatch { what, got_w, got_h, want_w, want_h, remedy })
-        }
-        other => other.map(drop),
-    }
+    MapKind::parse(name)
+        .ok_or_else(|| Error::parameter("kind", MapKind::expected(), format!("`{name}`")))
 }
 
 /// A line of a tile's trace: level, iteration, texture cost, stationarity cost.
 type StepOut = (usize, u32, Option<f64>, f64);
 
-/// Makes a tile. Returns the picture, the source map, the gathered maps, the report as JSON and the
-/// trace.
+/// A tile for Python: the picture, the source map, the gathered maps and the report as JSON.
+type TileOut<'py> =
+    (ArrayOut<'py>, Option<MapOut<'py>>, Vec<(String, ArrayOut<'py>)>, String, Vec<StepOut>);
+
+/// Makes `count` tiles.
 #[pyfunction]
 #[expect(
     clippy::too_many_arguments,
     reason = "one private caller, in _api.py, passes them by name"
 )]
-#[expect(clippy::type_complexity, reason = "one private caller, in _api.py, names its parts")]
-#[pyo3(signature = (*, photo, mask, sigma_map, maps, params, seed, threads, progress, trace))]
-fn tile<'py>(
+#[pyo3(signature = (*, photo, also, mask, avoid, sigma_map, maps, params, seed, count, threads, progress, trace))]
+fn tiles<'py>(
     py: Python<'py>,
     photo: ArrayIn<'py>,
+    also: Vec<ArrayIn<'py>>,
     mask: Option<ArrayIn<'py>>,
+    avoid: Option<ArrayIn<'py>>,
     sigma_map: Option<ArrayIn<'py>>,
     maps: Vec<NamedMap<'py>>,
     params: Vec<(String, String)>,
     seed: u64,
+    count: usize,
     threads: usize,
     progress: Option<Bound<'py, PyAny>>,
     trace: bool,
-) -> PyResult<(
-    ArrayOut<'py>,
-    Option<MapOut<'py>>,
-    Vec<(String, ArrayOut<'py>)>,
-    String,
-    Vec<StepOut>,
-)> {
+) -> PyResult<Vec<TileOut<'py>>> {
     let mut settings = TileParams::default();
     for (name, text) in &params {
         settings.set(name, text).into_py(py)?;
     }
     settings.validate().into_py(py)?;
-    let photo = photo.picture(py)?;
-    let mask = mask.map(|mask| mask_of(py, &mask)).transpose()?;
+    let pictures = |all: &[ArrayIn<'py>]| {
+        all.iter().map(|picture| picture.picture(py)).collect::<PyResult<Vec<_>>>()
+    };
+    let (photo, also) = (photo.picture(py)?, pictures(&also)?);
+    let read_mask = |mask: Option<ArrayIn<'py>>| mask.map(|mask| mask_of(py, &mask)).transpose();
+    let (mask, avoid) = (read_mask(mask)?, read_mask(avoid)?);
     let sigma_map = match sigma_map {
         Some(map) => Some(SigmaMap::from_picture(&map.picture(py)?).into_py(py)?),
         None => None,
     };
     let mut others = Vec::with_capacity(maps.len());
-    for (name, map, kind) in &maps {
-        let map = map.picture(py)?;
-        ensure_same_shape(name, &map, &photo).into_py(py)?;
-        others.push((name.clone(), map, kind_named(kind).into_py(py)?));
+    for (name, maps, kind) in &maps {
+        let (maps, kind) = (pictures(maps)?, kind_named(kind).into_py(py)?);
+        Inputs { also: &also, ..Inputs::new(&photo) }
+            .ensure_maps_fit(name, &maps.iter().collect::<Vec<_>>(), kind, &settings)
+            .into_py(py)?;
+        others.push((name.clone(), maps, kind));
     }
     let ctx = Ctx::new(seed, threads).into_py(py)?;
     let job = ctx.job();
-    let (tile, gathered) = enter::enter(py, &job, progress.as_ref(), move || {
-        let guides = Guides { mask: mask.as_ref(), sigma_map: sigma_map.as_ref(), trace };
-        let tile = tile_guided(&ctx, &photo, guides, &settings)?;
-        let mut gathered = Vec::with_capacity(others.len());
-        if let Some(source_map) = &tile.source_map {
-            for (name, map, kind) in others {
-                gathered.push((name, source_map.apply(&map, kind)?));
-            }
-        }
-        Ok((tile, gathered))
+    let made = enter::enter(py, &job, progress.as_ref(), move || {
+        let inputs = Inputs {
+            also: &also,
+            mask: mask.as_ref(),
+            avoid: avoid.as_ref(),
+            sigma_map: sigma_map.as_ref(),
+            trace,
+            ..Inputs::new(&photo)
+        };
+        let gather = |tile: Tile| {
+            let gathered = tile.source_map.iter().flat_map(|source_map| {
+                let gather = |(name, maps, kind): &(String, Vec<Picture>, MapKind)| {
+                    let maps: Vec<&Picture> = maps.iter().collect();
+                    Ok((name.clone(), source_map.apply_all(&maps, *kind)?))
+                };
+                others.iter().map(gather)
+            });
+            let gathered = gathered.collect::<Result<Vec<_>>>()?;
+            Ok((tile, gathered))
+        };
+        let tiles = crate::verb::tile::tiles(&ctx, &inputs, &settings, count)?;
+        tiles.into_iter().map(gather).collect::<Result<Vec<_>>>()
     })?;
-    let report = serde_json::to_string(&tile.report)
-        .map_err(|e| Error::Internal { message: e.to_string() })
-        .into_py(py)?;
-    let source_map = tile.source_map.as_ref().map(|map| map_out(py, map)).transpose()?;
-    let maps = gathered
-        .into_iter()
-        .map(|(name, picture)| Ok((name, array_out(py, &picture)?)))
-        .collect::<PyResult<_>>()?;
-    let step = |s: &Step| (s.level, s.iteration, s.costs.texture, s.costs.stationarity);
-    let trace = tile.trace.iter().map(step).collect();
-    Ok((array_out(py, &tile.picture)?, source_map, maps, report, trace))
+    let out = |(tile, gathered): (Tile, Vec<(String, Picture)>)| {
+        let report = serde_json::to_string(&tile.report)
+            .map_err(|e| Error::Internal { message: e.to_string() })
+            .into_py(py)?;
+        let source_map = tile.source_map.as_ref().map(|map| map_out(py, map)).transpose()?;
+        let maps = gathered
+            .into_iter()
+            .map(|(name, picture)| Ok((name, array_out(py, &picture)?)))
+            .collect::<PyResult<_>>()?;
+        let step = |s: &Step| (s.level, s.iteration, s.costs.texture, s.costs.stationarity);
+        let trace = tile.trace.iter().map(step).collect();
+        Ok((array_out(py, &tile.picture)?, source_map, maps, report, trace))
+    };
+    made.into_iter().map(out).collect()
 }
 
 fn mask_of(py: Python<'_>, mask: &ArrayIn<'_>) -> PyResult<Mask> {
@@ -163,19 +169,20 @@ fn texture_cost<'py>(
     Ok((cost.mean, cost.margin, cost.samples))
 }
 
-/// Gathers a map through a source map.
+/// Gathers a map, one picture of each photo, through a source map.
 #[pyfunction]
-#[pyo3(signature = (*, source_map, picture, kind))]
+#[pyo3(signature = (*, source_map, pictures, kind))]
 fn apply<'py>(
     py: Python<'py>,
     source_map: MapIn<'py>,
-    picture: ArrayIn<'py>,
+    pictures: Vec<ArrayIn<'py>>,
     kind: &str,
 ) -> PyResult<ArrayOut<'py>> {
     let kind = kind_named(kind).into_py(py)?;
     let source_map = source_map.source_map(py)?;
-    let picture = picture.picture(py)?;
-    let out = enter::unheard(py, move || source_map.apply(&picture, kind))?;
+    let maps = pictures.iter().map(|map| map.picture(py)).collect::<PyResult<Vec<_>>>()?;
+    let out =
+        enter::unheard(py, move || source_map.apply_all(&maps.iter().collect::<Vec<_>>(), kind))?;
     array_out(py, &out)
 }
 
@@ -237,12 +244,8 @@ fn write_source_map<'py>(
 
 /// What the numbers of a material's map of this name are.
 #[pyfunction]
-fn map_kind(name: &str) -> &'static str {
-    match material::classify(name) {
-        Some((_, MapKind::Color)) => "color",
-        Some((_, MapKind::Normal)) => "normal",
-        Some((_, MapKind::Data)) | None => "data",
-    }
+fn map_kind(name: &str) -> String {
+    material::classify(name).map_or(MapKind::Data, |(_, kind)| kind).show()
 }
 
 /// Every parameter of a verb (`texture_cost`, else `tile`), with its default as text.
@@ -313,7 +316,7 @@ mod _texforge {
     #[pymodule_export]
     use super::{
         apply, cli_main, cli_study, encode_png, error_kinds, fail, map_kind, read, read_source_map,
-        schema, texture_cost, tile, write, write_source_map,
+        schema, texture_cost, tiles, write, write_source_map,
     };
 
     use pyo3::prelude::*;

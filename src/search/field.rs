@@ -61,10 +61,17 @@ impl Field {
         Self { height, width, pos: (0..height * width).into_par_iter().map(item).collect() }
     }
 
-    /// The field of the next finer level: each position keeps its offset, scaled, so that regions
-    /// that were copied in one piece stay in one piece.
+    /// The field of the next finer level, whose source is `source` and was `coarse`: each position
+    /// keeps its view and its offset, scaled, so that regions that were copied in one piece stay in
+    /// one piece.
     #[must_use]
-    pub fn upsampled(&self, height: usize, width: usize, source: &Source, seed: u64) -> Self {
+    pub fn upsampled(
+        &self,
+        (height, width): (usize, usize),
+        coarse: &Source,
+        source: &Source,
+        seed: u64,
+    ) -> Self {
         const STAGE: u32 = 2;
         let half = (source.patch / 2) as isize;
         // Round(offset * fine / coarse) in integers, half away from zero.
@@ -78,13 +85,18 @@ impl Field {
             let (cy, cx) =
                 ((2 * y + 1) * self.height / (2 * height), (2 * x + 1) * self.width / (2 * width));
             let from = self.pos[cy * self.width + cx];
-            let dy = from.y() as isize + half - cy as isize;
-            let dx = from.x() as isize + half - cx as isize;
+            // A usable patch lies in a view.
+            let view = coarse.atlas.view_at(from.y(), from.x()).unwrap_or(0);
+            let (y0, x0) = coarse.atlas.views()[view].corner;
+            let dy = (from.y() - y0) as isize + half - cy as isize;
+            let dx = (from.x() - x0) as isize + half - cx as isize;
             let ty = y as isize + scale(dy, height, self.height) - half;
             let tx = x as isize + scale(dx, width, self.width) - half;
+            let view = &source.atlas.views()[view];
+            let last = |side: usize| (side - source.patch) as isize;
             let pos = Pos::new(
-                ty.clamp(0, source.rows() as isize - 1) as usize,
-                tx.clamp(0, source.cols() as isize - 1) as usize,
+                view.corner.0 + ty.clamp(0, last(view.size.0)) as usize,
+                view.corner.1 + tx.clamp(0, last(view.size.1)) as usize,
             );
             if source.is_usable(pos) {
                 pos

@@ -1,5 +1,6 @@
 //! Room 3: who looks like whom.
 
+pub mod atlas;
 pub mod field;
 pub mod patch;
 pub mod patchmatch;

@@ -8,6 +8,9 @@ use crate::search::source::Source;
 /// Costs saturate here: sums with distances cannot overflow, nor reach those of unusable patches.
 const MOST: f32 = (1 << 28) as f32;
 
+/// Marks the cells that a cost says nothing about.
+pub(crate) const ELSEWHERE: i32 = -1;
+
 /// What it costs to copy from each place of a source, besides how well it fits: on a grid of cells
 /// of a third of a patch, in squared codes.
 #[derive(Debug, Clone)]
@@ -95,10 +98,45 @@ impl PlaceCost {
         self
     }
 
-    /// This cost for a source of another size that shows the same.
+    /// This cost and a further one for every patch of each picture of the source's atlas.
     #[must_use]
-    pub fn resized(&self, source: &Source) -> Self {
+    pub fn with_picture_costs(mut self, source: &Source, costs: &[i32]) -> Self {
+        let cells = |from: usize, len: usize| {
+            // The cells that begin in the view; one that reaches over its end is hardly used.
+            let cell = 1 << self.shift;
+            from.div_ceil(cell)..(from + len).div_ceil(cell)
+        };
+        let rows = self.cost.len() / self.cols;
+        for view in source.atlas.views() {
+            for y in cells(view.corner.0, view.size.0).filter(|&y| y < rows) {
+                for x in cells(view.corner.1, view.size.1).filter(|&x| x < self.cols) {
+                    let cost = &mut self.cost[y * self.cols + x];
+                    *cost = cost.saturating_add(costs[view.picture]).min(MOST as i32);
+                }
+            }
+        }
+        self
+    }
+
+    /// This cost, of the source `from`, for one of another size that shows the same.
+    #[must_use]
+    pub fn resized(&self, from: &Source, source: &Source) -> Self {
         let mut to = Self::free(source);
+        if !source.atlas.is_plain() {
+            let place = |cell: usize| (cell << to.shift) + (1 << to.shift) / 2;
+            for i in 0..to.cost.len() {
+                let (y, x) = (place(i / to.cols), place(i % to.cols));
+                // The lines between views do not grow with them: each view for itself.
+                let Some(at) = source.atlas.view_at(y, x) else { continue };
+                let (fine, coarse) = (source.atlas.views()[at], from.atlas.views()[at]);
+                let y = coarse.corner.0 + (y - fine.corner.0) * coarse.size.0 / fine.size.0;
+                let x = coarse.corner.1 + (x - fine.corner.1) * coarse.size.1 / fine.size.1;
+                let (row, col) = (y >> self.shift, x >> self.shift);
+                let rows = self.cost.len() / self.cols;
+                to.cost[i] = self.cost[row.min(rows - 1) * self.cols + col.min(self.cols - 1)];
+            }
+            return to;
+        }
         let (from_rows, to_rows) = (self.cost.len() / self.cols, to.cost.len() / to.cols);
         for (i, cost) in to.cost.iter_mut().enumerate() {
             let y = (2 * (i / to.cols) + 1) * from_rows / (2 * to_rows);
@@ -124,11 +162,14 @@ impl PlaceCost {
         self.cost.len()
     }
 
-    /// By how much each cell's cost exceeds what a `share` of the cells do not exceed.
+    /// By how much each cell's cost exceeds what a `share` of the cells (but those that are
+    /// [`ELSEWHERE`]) do not exceed.
     pub(crate) fn excess_over(mut self, share: f64) -> Self {
         let mut sorted = self.cost.clone();
+        sorted.retain(|&cost| cost != ELSEWHERE);
         sorted.sort_unstable();
-        let common = sorted[((sorted.len() - 1) as f64 * share) as usize];
+        let at = (sorted.len().saturating_sub(1) as f64 * share) as usize;
+        let common = sorted.get(at).copied().unwrap_or(0);
         self.cost.iter_mut().for_each(|cost| *cost = (*cost - common).max(0));
         self
     }

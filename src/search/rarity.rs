@@ -9,7 +9,7 @@ use crate::base::ctx::Ctx;
 use crate::base::rng::Rng;
 use crate::search::field::Pos;
 use crate::search::patch::{Kernel, WithKernel, with_kernel};
-use crate::search::place_cost::PlaceCost;
+use crate::search::place_cost::{ELSEWHERE, PlaceCost};
 use crate::search::source::Source;
 
 /// Patch comparisons for one picture, about.
@@ -23,16 +23,34 @@ const COMMON: f64 = 0.75;
 /// a random few.
 ///
 /// # Determinism
-/// Depends on the source and `ctx.seed` alone.
+/// Depends on the source alone, so that tiles of several seeds share it.
 pub fn rarity(ctx: &Ctx, source: &Source) -> PlaceCost {
     const STAGE: u32 = 6;
     let n = (COMPARISONS / PlaceCost::free(source).n_cells()).max(64);
-    let others: Vec<Pos> =
-        (0..n).map(|i| source.random(&mut Rng::new(ctx.seed, STAGE, 0, i as u64))).collect();
-    PlaceCost::of_each(source, |pos| {
-        with_kernel(ctx.simd, source.patch, Nearest { source, pos, others: &others })
-    })
-    .excess_over(COMMON)
+    let picture = |pos: Pos| {
+        let view = source.atlas.view_at(pos.y(), pos.x());
+        view.map(|view| source.atlas.views()[view].picture)
+    };
+    let n_pictures = source.atlas.views().last().map_or(1, |view| view.picture + 1);
+    // Of several photos, what is rare in its own: a small photo is not rare as a whole.
+    let mut others = vec![Vec::new(); n_pictures];
+    for i in 0..n * n_pictures {
+        let pos = source.random(&mut Rng::new(0, STAGE, 0, i as u64));
+        if let Some(picture) = picture(pos) {
+            others[picture].push(pos);
+        }
+    }
+    let within = |(own, others): (usize, &Vec<Pos>)| {
+        PlaceCost::of_each(source, |pos| match picture(pos) {
+            Some(picture) if picture == own => {
+                with_kernel(ctx.simd, source.patch, Nearest { source, pos, others })
+            }
+            _ => ELSEWHERE,
+        })
+        .excess_over(COMMON)
+    };
+    let each = others.iter().enumerate().map(within);
+    each.reduce(|all, one| all.plus(1.0, &one)).unwrap_or_else(|| PlaceCost::free(source))
 }
 
 /// Distance to the nearest of `others` that does not overlap; 0 if there is none.

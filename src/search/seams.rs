@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use crate::base::ctx::Ctx;
 use crate::base::error::Result;
+use crate::search::atlas::Atlas;
 use crate::search::patch::MatchImage;
 use crate::search::patchmatch::{Wrap, neighbor};
 
@@ -17,6 +18,8 @@ pub type From = [u32; 2];
 pub struct Canvas<'a> {
     /// The exemplar's codes.
     pub source: &'a MatchImage,
+    /// The pictures in it.
+    pub atlas: &'a Atlas,
     /// Where it may be used (`None`: everywhere).
     pub usable: Option<&'a [bool]>,
     /// The voted output (codes), `height` x `width`.
@@ -145,7 +148,7 @@ impl Canvas<'_> {
     }
 
     fn inside(&self, [y, x]: From) -> bool {
-        (y as usize) < self.source.height() && (x as usize) < self.source.width()
+        self.atlas.view_at(y as usize, x as usize).is_some()
     }
 }
 

@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use crate::search::atlas::Atlas;
 use crate::search::field::Pos;
 use crate::search::patch::MatchImage;
 
@@ -12,6 +13,8 @@ pub struct Source {
     pub image: MatchImage,
     /// Patch side.
     pub patch: usize,
+    /// The pictures in it.
+    pub atlas: Atlas,
     /// What is usable, if not all positions are.
     usable: Option<Usable>,
 }
@@ -27,12 +30,23 @@ impl Source {
     /// A source; `mask` has one flag a pixel, and a patch is usable if all its pixels are.
     /// Returns `None` if no patch is usable.
     pub fn new(image: MatchImage, patch: usize, mask: Option<&[bool]>) -> Option<Self> {
+        let atlas = Atlas::plain(image.height(), image.width());
+        Self::of_atlas(image, patch, mask, atlas)
+    }
+
+    /// As [`Source::new`], of the image of an atlas, whose `mask` keeps its views apart.
+    pub fn of_atlas(
+        image: MatchImage,
+        patch: usize,
+        mask: Option<&[bool]>,
+        atlas: Atlas,
+    ) -> Option<Self> {
         let (h, w) = (image.height(), image.width());
         if h < patch || w < patch {
             return None;
         }
         let Some(mask) = mask.filter(|m| m.iter().any(|&ok| !ok)) else {
-            return Some(Self { image, patch, usable: None });
+            return Some(Self { image, patch, atlas, usable: None });
         };
         let bad = box_sums(h, w, patch, |y, row| {
             for (sum, &ok) in row.iter_mut().zip(&mask[y * w..(y + 1) * w]) {
@@ -44,7 +58,7 @@ impl Source {
         let some = flags.iter().enumerate().filter(|(_, ok)| **ok);
         let list: Vec<Pos> = some.map(|(at, _)| Pos::new(at / cols, at % cols)).collect();
         let usable = Some(Usable { flags, list }).filter(|u| !u.list.is_empty())?;
-        Some(Self { image, patch, usable: Some(usable) })
+        Some(Self { image, patch, atlas, usable: Some(usable) })
     }
 
     /// Number of patch positions vertically.

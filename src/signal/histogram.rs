@@ -130,6 +130,21 @@ impl Quantiles {
         (!all.is_empty()).then(|| Self { table: (0..=QUANTILES).map(median).collect() })
     }
 
+    /// The quantiles of all values together of several distributions with these weights; `None` of
+    /// none. One alone stays as it is.
+    pub fn pooled(all: &[(Self, f64)]) -> Option<Self> {
+        if let [(only, _)] = all {
+            return Some(only.clone());
+        }
+        let mut masses = vec![0.0; BINS];
+        for (quantiles, weight) in all {
+            for pair in quantiles.table.windows(2) {
+                masses[bin_of(rounded(f32::midpoint(pair[0], pair[1]))).0] += weight;
+            }
+        }
+        Some(Distribution::from_masses(&masses)?.quantiles())
+    }
+
     /// The value below which the share `u` in `0..=1` lies.
     #[inline]
     pub fn at(&self, u: f32) -> f32 {
@@ -190,6 +205,26 @@ mod tests {
         let half = wanted.matching_table(&own, 0.5);
         assert!(table[2500].abs_diff(5000) < 64, "{}", table[2500]);
         assert!(half[2500].abs_diff(3750) < 64, "{}", half[2500]);
+    }
+
+    #[test]
+    fn pooling_is_the_distribution_of_all_values() {
+        let (a, b) = (|| (0..2000).map(|i| 500 + i), || (0..1000).map(|i| 3000 + 4 * i));
+        let of = |values: &mut dyn Iterator<Item = u16>| {
+            Distribution::of(values).expect("some").quantiles()
+        };
+        let pooled = [(of(&mut a()), 2000.0), (of(&mut b()), 1000.0)];
+        let pooled = Quantiles::pooled(&pooled).expect("some");
+        let want = of(&mut a().chain(b()));
+        for u in [0.05, 0.3, 0.6, 0.7, 0.9] {
+            assert!(
+                (pooled.at(u) - want.at(u)).abs() < 64.0,
+                "{u}: {} {}",
+                pooled.at(u),
+                want.at(u)
+            );
+        }
+        assert!(Quantiles::pooled(&[]).is_none());
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 pub mod histogram;
 pub mod localhist;
+pub mod lowpass;
 pub mod measure;
 pub mod resample;
 pub mod steerable;

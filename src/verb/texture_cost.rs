@@ -11,7 +11,8 @@ use crate::image::mask::Mask;
 use crate::image::picture::Picture;
 use crate::image::sourcemap::SourceMap;
 use crate::search::patchmatch::Wrap;
-use crate::verb::tile::{Axis, TileParams, usable_mask};
+use crate::verb::inputs::Inputs;
+use crate::verb::params::{Axis, TileParams};
 
 params! {
     /// Parameters of [`texture_cost`].
@@ -71,7 +72,8 @@ pub fn texture_cost(
     params: &TextureCostParams,
 ) -> Result<TextureCost> {
     check(texture, photo, map, params)?;
-    let mask = usable_mask(photo, mask)?;
+    let inputs = Inputs { mask, ..Inputs::new(photo) };
+    let mask = inputs.usable(&TileParams::default())?.remove(0);
     let wrap = Wrap { y: params.axis != Axis::X, x: params.axis != Axis::Y };
     let sampling = Sampling { patch: params.patch, samples: params.samples, wrap };
     let measure = || mean_nearest(ctx, texture, photo, map, mask.as_ref(), sampling);
@@ -110,16 +112,19 @@ fn check(
     }
     let size = |p: &Picture| (p.height(), p.width());
     let fits = |map: &SourceMap| {
-        (map.height(), map.width()) == size(texture) && map.source_size() == size(photo)
+        (map.height(), map.width()) == size(texture)
+            && map.source_size() == size(photo)
+            && map.origins().is_none()
     };
     if !map.is_none_or(fits) {
         return Err(Error::BadPicture {
             what: "source map".into(),
-            reason: "it is not of the sizes of the texture and the photo".into(),
+            reason:
+                "it must be of the sizes of the texture and the photo, and of one photo as it lies"
+                    .into(),
         });
     }
-    // Of each pixel: colours (12), codes (4), sums of squares and norms (8),
-    // what is known and what is drawn (32).
+    // Of each pixel: colours (12), codes (4), what is usable (8), what is known and what is drawn (32).
     let pixels = |p: &Picture| p.width() as u64 * p.height() as u64;
     let canvas = (texture.width() + params.patch) as u64 * (texture.height() + params.patch) as u64;
     let need = 24 * pixels(photo) + 12 * pixels(texture) + 48 * canvas;

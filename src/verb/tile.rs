@@ -8,137 +8,29 @@ use crate::analyze::{stationarity, texture};
 use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
 use crate::base::memory::ensure_available;
-use crate::base::params::{Value, choice, params};
+use crate::base::params::Value as _;
 use crate::image::color::ColorModel;
 use crate::image::mask::Mask;
 use crate::image::material::MapKind;
 use crate::image::picture::Picture;
 use crate::image::sigma_map::SigmaMap;
 use crate::image::sourcemap::SourceMap;
-use crate::method::{make_seamless, stationary};
+use crate::method::make_seamless;
+use crate::method::stationary::{self, Exemplar};
 use crate::search::patchmatch::Wrap;
-use crate::signal::measure::{ORDERS, Statistic};
+use crate::signal::measure::Statistic;
 use crate::signal::window::Domain;
+use crate::verb::inputs::Inputs;
+use crate::verb::params::{Axis, Measure, Method, Quality, Size, Symmetries, TileParams};
 
 /// Longest side of a tile, in pixels.
 const MAX_TILE_SIDE: usize = 32_768;
 
-/// Size of the tile.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Size {
-    /// The largest power of two that is at most a tenth larger than the photo's shorter side, at
-    /// most 2048; not square if the photo is at least twice as long as it is wide. With
-    /// [`Method::MakeSeamless`], the photo's own size.
-    Auto,
-    /// This many pixels.
-    Pixels {
-        /// Width in pixels.
-        width: usize,
-        /// Height in pixels.
-        height: usize,
-    },
-}
+/// Most tiles of one run.
+pub const MAX_VARIANTS: usize = 1000;
 
-impl Value for Size {
-    const KIND: &'static str = "size";
-
-    fn parse(text: &str) -> Option<Self> {
-        if text == "auto" {
-            return Some(Self::Auto);
-        }
-        let (width, height) = text.split_once(['x', 'X']).unwrap_or((text, text));
-        Some(Self::Pixels { width: width.parse().ok()?, height: height.parse().ok()? })
-    }
-
-    fn show(&self) -> String {
-        match self {
-            Self::Auto => "auto".into(),
-            Self::Pixels { width, height } => format!("{width}x{height}"),
-        }
-    }
-
-    fn expected() -> String {
-        "a size as WIDTHxHEIGHT (one number for a square), or auto".into()
-    }
-}
-
-choice! {
-    /// In which directions the tile repeats.
-    pub enum Axis {
-        /// In both.
-        Both = "both",
-        /// Horizontally only (a trim sheet).
-        X = "x",
-        /// Vertically only.
-        Y = "y",
-    }
-}
-
-choice! {
-    /// How the tile is made.
-    pub enum Method {
-        /// Toroidal PatchMatch with stationarity projection (Moritz et al. 2017).
-        Stationary = "stationary",
-        /// Baseline: toroidal PatchMatch without the projection.
-        WrapOnly = "wrap-only",
-        /// Baseline: PatchMatch that does not wrap at all.
-        NoWrap = "no-wrap",
-        /// Baseline: shift by half and blend over the seam, as image editors do.
-        MakeSeamless = "make-seamless",
-    }
-}
-
-choice! {
-    /// The statistic that is made equal everywhere.
-    pub enum Measure {
-        /// Local histograms of each colour channel: the whole distribution.
-        Histogram = "histogram",
-        /// Local moments of each colour channel: mean, variance and so on, up to `order`.
-        Moments = "moments",
-        /// Local histograms of oriented filters' responses: only fine structure, no shades.
-        Steerable = "steerable",
-        /// None: the same as the method `wrap-only`.
-        None = "none",
-    }
-}
-
-choice! {
-    /// How much time to spend.
-    pub enum Quality {
-        /// A quick look.
-        Draft = "draft",
-        /// The default.
-        Normal = "normal",
-        /// More iterations; about three times the time of normal.
-        Best = "best",
-    }
-}
-
-params! {
-    /// Parameters of [`tile`].
-    pub struct TileParams for "tile" {
-        /// Size of the tile: WIDTHxHEIGHT, or auto for the largest power of two that about fits into the photo.
-        size: Size = Size::Auto, unit "px";
-        /// In which directions the tile repeats.
-        axis: Axis = Axis::Both;
-        /// How the tile is made; all but stationary are baselines to compare with.
-        method: Method = Method::Stationary;
-        /// The statistic that is made equal everywhere in the tile.
-        measure: Measure = Measure::Histogram;
-        /// With the measure moments, how many of them: 1 the mean, 2 and the variance, 3 and the skewness, 4 and the kurtosis.
-        order: usize = 2, in 1..=4;
-        /// Reach of the stationarity measure: smaller evens out smaller stains, larger keeps more variety.
-        sigma: f32 = 0.1, in 0.01..=1.0, unit "fraction of the tile's shorter side";
-        /// Side of the patches that are compared; odd. Larger keeps larger features whole, smaller mixes more.
-        patch: usize = 11, in 3..=21, unit "px";
-        /// How strongly every part of the photo is made to contribute equally; 0 switches it off.
-        uniformity: f32 = 1.0, in 0.0..=100.0;
-        /// How strongly single things that catch the eye (a leaf, a nail, a dark spot) are held back; 0 treats them like the rest. For the method stationary.
-        rarity: f32 = 1.0, in 0.0..=4.0;
-        /// How much time to spend.
-        quality: Quality = Quality::Normal;
-    }
-}
+/// Least radius of the flattening: what is smaller than this share of the photo is texture.
+const LEAST_FLATTEN: f32 = 0.02;
 
 /// What the finished tile costs, measured on the delivered picture. Lower is better.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -170,11 +62,15 @@ pub struct Report {
     pub params: Vec<(&'static str, String)>,
     /// Width and height of the photo in pixels.
     pub photo_size: (usize, usize),
+    /// Width and height of the further photos.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub also_sizes: Vec<(usize, usize)>,
     /// Width and height of the tile in pixels.
     pub tile_size: (usize, usize),
     /// The costs.
     pub costs: Costs,
-    /// Wall time in seconds of each stage, in order. The only part that differs between runs.
+    /// Wall time in seconds of each stage, in order; `analysis` is that of the photo, which the
+    /// variants of a run share. The only part that differs between runs.
     pub seconds: Vec<(&'static str, f64)>,
     /// What the user should know, one sentence each.
     pub notes: Vec<String>,
@@ -199,47 +95,16 @@ pub struct Step {
 /// The result of [`tile`].
 #[derive(Debug, Clone)]
 pub struct Tile {
-    /// The tile, in the photo's own sample type.
+    /// The tile, in the photo's own sample type; of the flattened photo's pixels if it was flattened.
     pub picture: Picture,
-    /// Which photo pixel each pixel of the tile is a copy of; `None` for
+    /// Which pixel of which photo each pixel of the tile is a copy of; `None` for
     /// [`Method::MakeSeamless`], which blends.
     pub source_map: Option<SourceMap>,
     /// How it was made and what it costs.
     pub report: Report,
-    /// The costs of every iteration, coarse to fine; empty unless [`Guides::trace`] is set, and with
+    /// The costs of every iteration, coarse to fine; empty unless [`Inputs::trace`] is set, and with
     /// [`Method::MakeSeamless`], which has no iterations.
     pub trace: Vec<Step>,
-}
-
-impl TileParams {
-    /// Width and height of the tile for a photo of this size: `size`, or the default if it is
-    /// [`Size::Auto`].
-    pub fn resolved_size(&self, photo_width: usize, photo_height: usize) -> (usize, usize) {
-        if let Size::Pixels { width, height } = self.size {
-            return (width, height);
-        }
-        if self.method == Method::MakeSeamless {
-            return (photo_width, photo_height);
-        }
-        let pow2 = |n: usize| (1 << (n.max(1) * 11 / 10).max(1).ilog2()).min(2048);
-        let (w, h) = (photo_width.max(1), photo_height.max(1));
-        if w >= 2 * h || h >= 2 * w {
-            return (pow2(w), pow2(h));
-        }
-        (pow2(w.min(h)), pow2(w.min(h)))
-    }
-
-    /// What `measure`, `order` and `sigma`, or the map in its place, say.
-    fn evenness(&self, sigma_map: Option<&SigmaMap>) -> Option<stationary::Evenness> {
-        let statistic = match self.measure {
-            Measure::Histogram => Statistic::Histogram,
-            Measure::Moments => Statistic::Moments(ORDERS[self.order - 1]),
-            Measure::Steerable => Statistic::Steerable,
-            Measure::None => return None,
-        };
-        let sigma_map = sigma_map.cloned();
-        Some(stationary::Evenness { statistic, sigma: self.sigma, sigma_map })
-    }
 }
 
 /// Turns a photo into a tile that repeats without a seam and without a blob that gives the
@@ -257,107 +122,128 @@ impl TileParams {
 ///
 /// # Errors
 /// [`Error::Parameter`], [`Error::TooSmall`] (patch larger than photo or tile),
-/// [`Error::EmptyMask`], [`Error::SizeMismatch`] (mask), [`Error::NotFinite`], [`Error::Memory`]
+/// [`Error::EmptyMask`], [`Error::SizeMismatch`] (masks), [`Error::NotFinite`], [`Error::Memory`]
 /// (checked before anything is allocated), [`Error::Cancelled`].
 pub fn tile(ctx: &Ctx, photo: &Picture, mask: Option<&Mask>, params: &TileParams) -> Result<Tile> {
-    tile_guided(ctx, photo, Guides { mask, ..Guides::default() }, params)
+    let one = tiles(ctx, &Inputs { mask, ..Inputs::new(photo) }, params, 1)?.pop();
+    one.ok_or_else(|| Error::Internal { message: "no tile came back".into() })
 }
 
-/// What [`tile_guided`] may be given besides the photo.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Guides<'a> {
-    /// Where the photo may be used; of the photo's size.
-    pub mask: Option<&'a Mask>,
-    /// How far the measure reaches at every pixel, in place of `sigma`; of the tile's size. The
-    /// histogram's cost is measured with `sigma` still, that of the measure in use with the map.
-    pub sigma_map: Option<&'a SigmaMap>,
-    /// Whether every iteration's costs are measured too, see [`Tile::trace`]. Same bytes; the time
-    /// that takes is listed apart in [`Report::seconds`].
-    pub trace: bool,
-}
-
-/// [`tile`], with further pictures that say what is wanted where.
+/// As [`tile`], with everything that a tile can be made from, and several times: `count` tiles
+/// whose seeds are `ctx.seed` and those after it. What is learnt about the photo is learnt once.
 ///
 /// # Paper
-/// Moritz et al. 2017, Fig. 10: a locally prescribed reach. Statistics are computed under windows of a
-/// few sizes and their mappings blended at every pixel.
+/// Moritz et al. 2017, Fig. 10: with a sigma map, a locally prescribed reach. Statistics are computed
+/// under windows of a few sizes and their mappings blended at every pixel.
 ///
 /// # Errors
-/// Those of [`tile`]; [`Error::SizeMismatch`] (sigma map).
-pub fn tile_guided(
+/// As [`tile`]; [`Error::SizeMismatch`] (sigma map); [`Error::Parameter`] for a `count` that is not 1 to 1000 (1 with
+/// [`Method::MakeSeamless`], which makes no random choices) and for seeds beyond the last one.
+pub fn tiles(
     ctx: &Ctx,
-    photo: &Picture,
-    guides: Guides<'_>,
+    inputs: &Inputs<'_>,
     params: &TileParams,
-) -> Result<Tile> {
-    let Guides { mask, sigma_map, trace: traced } = guides;
+    count: usize,
+) -> Result<Vec<Tile>> {
     let start = Instant::now();
-    let (width, height) = check(photo, sigma_map, params)?;
-    let size = (height, width);
+    let (width, height) = check(inputs, params, count)?;
+    let last = ctx.seed.checked_add(count as u64 - 1);
+    if last.is_none() {
+        let expected = format!("at most {} with {count} variants", u64::MAX - (count as u64 - 1));
+        return Err(Error::parameter("seed", expected, ctx.seed));
+    }
     let wrap = Wrap { y: params.axis != Axis::X, x: params.axis != Axis::Y };
-    let mask = usable_mask(photo, mask)?;
+    let masks = inputs.usable(params)?;
     let mut notes = Vec::new();
-    if mask.is_some() && params.method == Method::MakeSeamless {
+    if masks[0].is_some() && params.method == Method::MakeSeamless {
         notes.push("the method make-seamless uses the whole photo; the mask is ignored".to_owned());
     }
-    if sigma_map.is_some()
+    if inputs.sigma_map.is_some()
         && (params.method != Method::Stationary || params.measure == Measure::None)
     {
         notes.push("nothing is made stationary; the sigma map changes no pixel".to_owned());
     }
-
-    let mut trace = Vec::new();
-    let mut tracing = Duration::ZERO;
-    let mut look = |look: &stationary::Look<'_>| {
-        let since = Instant::now();
-        let picture = look.map.apply(look.exemplar, MapKind::Color)?;
-        let costs = costs(look.exemplar, &picture, Some(&look.map), params, sigma_map, wrap);
-        trace.push(Step { level: look.level, iteration: look.iteration, costs });
-        tracing += since.elapsed();
-        Ok(())
-    };
-    let watch: Option<stationary::Watch<'_>> = if traced { Some(&mut look) } else { None };
-    let (picture, source_map) = ctx.install(|| {
+    let plan = plan(params, inputs.sigma_map, (height, width), wrap);
+    let (flat, exemplar) = ctx.install(|| {
+        let flat = inputs.flattened(&masks, params, &mut notes)?;
         if params.method == Method::MakeSeamless {
-            return Ok((make_seamless::run(photo, size, wrap)?, None));
+            return Ok((flat, None));
         }
-        let plan = plan(params, sigma_map, size, wrap);
-        let map = stationary::run(ctx, photo, mask.as_ref(), &plan, watch)?;
-        Ok((map.apply(photo, MapKind::Color)?, Some(map)))
+        let photos = inputs.photos(flat.as_deref());
+        let photos: Vec<_> = photos.into_iter().zip(masks.iter().map(Option::as_ref)).collect();
+        let exemplar = Exemplar::new(ctx, &photos, params.symmetry.list(), &plan, inputs.trace)?;
+        Ok((flat, Some(exemplar)))
     })?;
-    let made = start.elapsed();
-    let synthesis = made.saturating_sub(tracing);
-    let costs =
-        ctx.install(|| Ok(costs(photo, &picture, source_map.as_ref(), params, sigma_map, wrap)))?;
+    let photos = inputs.photos(flat.as_deref());
+    let analysed = start.elapsed();
+    ctx.begin(exemplar.as_ref().map_or(0, |e| e.work(&plan) * count as u64));
     let mut resolved = params.clone();
     resolved.size = Size::Pixels { width, height };
-    let report = Report {
-        version: env!("CARGO_PKG_VERSION"),
-        seed: ctx.seed,
-        params: resolved.show(),
-        photo_size: (photo.width(), photo.height()),
-        tile_size: (width, height),
-        costs,
-        seconds: [
-            Some(("synthesis", synthesis.as_secs_f64())),
-            traced.then_some(("trace", tracing.as_secs_f64())),
-            Some(("costs", start.elapsed().saturating_sub(made).as_secs_f64())),
-        ]
-        .into_iter()
-        .flatten()
-        .collect(),
-        notes,
+    let make = |seed: u64| {
+        let start = Instant::now();
+        let ctx = ctx.with_seed(seed);
+        let measured = |photos: &[&Picture], picture: &Picture, map: Option<&SourceMap>| {
+            costs(photos, picture, map, params, inputs.sigma_map, wrap)
+        };
+        let (mut trace, mut tracing) = (Vec::new(), Duration::ZERO);
+        let mut look = |look: &stationary::Look<'_>| {
+            let since = Instant::now();
+            let photos: Vec<&Picture> = look.photos.iter().collect();
+            let picture = look.map.apply_all(&photos, MapKind::Color)?;
+            let costs = measured(&photos, &picture, Some(&look.map));
+            trace.push(Step { level: look.level, iteration: look.iteration, costs });
+            tracing += since.elapsed();
+            Ok(())
+        };
+        let watch: Option<stationary::Watch<'_>> =
+            if inputs.trace { Some(&mut look) } else { None };
+        let (picture, source_map) = ctx.install(|| match &exemplar {
+            None => Ok((make_seamless::run(photos[0], (height, width), wrap)?, None)),
+            Some(exemplar) => {
+                let map = stationary::run(&ctx, exemplar, &plan, watch)?;
+                Ok((map.apply_all(&photos, MapKind::Color)?, Some(map)))
+            }
+        })?;
+        let made = start.elapsed();
+        let costs = ctx.install(|| Ok(measured(&photos, &picture, source_map.as_ref())))?;
+        let report = Report {
+            version: env!("CARGO_PKG_VERSION"),
+            seed,
+            params: resolved.show(),
+            photo_size: (photos[0].width(), photos[0].height()),
+            also_sizes: photos[1..].iter().map(|p| (p.width(), p.height())).collect(),
+            tile_size: (width, height),
+            costs,
+            seconds: [
+                Some(("analysis", analysed.as_secs_f64())),
+                Some(("synthesis", made.saturating_sub(tracing).as_secs_f64())),
+                inputs.trace.then_some(("trace", tracing.as_secs_f64())),
+                Some(("costs", start.elapsed().saturating_sub(made).as_secs_f64())),
+            ]
+            .into_iter()
+            .flatten()
+            .collect(),
+            notes: notes.clone(),
+        };
+        Ok(Tile { picture, source_map, report, trace })
     };
-    Ok(Tile { picture, source_map, report, trace })
+    (0..count as u64).map(|i| make(ctx.seed + i)).collect()
 }
 
 /// Checks everything that can be known before the work; returns the tile's width and height.
-fn check(
-    photo: &Picture,
-    sigma_map: Option<&SigmaMap>,
-    params: &TileParams,
-) -> Result<(usize, usize)> {
+fn check(inputs: &Inputs<'_>, params: &TileParams, count: usize) -> Result<(usize, usize)> {
     params.validate()?;
+    if !(1..=MAX_VARIANTS).contains(&count) {
+        return Err(Error::parameter("variants", format!("1 to {MAX_VARIANTS}"), count));
+    }
+    if count > 1 && params.method == Method::MakeSeamless {
+        let expected = "1 with the method make-seamless, which makes no random choices";
+        return Err(Error::parameter("variants", expected, count));
+    }
+    if params.flatten > 0.0 && params.flatten < LEAST_FLATTEN {
+        let expected = format!("0 (off) or {LEAST_FLATTEN} to 1; less is texture, not light");
+        return Err(Error::parameter("flatten", expected, params.flatten));
+    }
     if params.patch.is_multiple_of(2) {
         return Err(Error::parameter("patch", "odd, so that a patch has a middle", params.patch));
     }
@@ -365,6 +251,7 @@ fn check(
         let expected = "left out unless the measure is `moments`";
         return Err(Error::parameter("order", expected, params.order));
     }
+    let photo = inputs.photo;
     let (width, height) = params.resolved_size(photo.width(), photo.height());
     let sides = 1..=MAX_TILE_SIDE;
     if !sides.contains(&width) || !sides.contains(&height) {
@@ -384,8 +271,6 @@ fn check(
             let expected = format!("at most the photo's {pw}x{ph} with the method make-seamless");
             return Err(Error::parameter("size", expected, format!("{width}x{height}")));
         }
-    } else if pw.min(ph) < params.patch {
-        return Err(too_small("the photo", pw, ph, "choose a smaller patch or a larger photo"));
     } else if width.min(height) < params.patch {
         return Err(too_small(
             "the tile",
@@ -394,31 +279,50 @@ fn check(
             "choose a smaller patch or a larger size",
         ));
     }
-    photo.ensure_finite("the photo")?;
-    if let Some(map) = sigma_map {
+    let photos = inputs.photos(None);
+    for (i, photo) in photos.iter().enumerate() {
+        let what = if i == 0 { "the photo".to_owned() } else { format!("photo {}", i + 1) };
+        let (pw, ph) = (photo.width(), photo.height());
+        if params.method != Method::MakeSeamless && pw.min(ph) < params.patch {
+            return Err(too_small(&what, pw, ph, "choose a smaller patch or a larger photo"));
+        }
+        photo.ensure_like(photos[0], &what)?;
+        photo.ensure_finite(&what)?;
+    }
+    if params.method == Method::MakeSeamless {
+        let expected = "left out with the method make-seamless, which uses one photo as it lies";
+        if photos.len() > 1 {
+            return Err(Error::parameter("also", expected, photos.len() - 1));
+        }
+        if params.symmetry != Symmetries::None {
+            return Err(Error::parameter("symmetry", expected, params.symmetry.show()));
+        }
+    }
+    if let Some(map) = inputs.sigma_map {
         map.ensure_size(height, width)?;
     }
     // A filtered channel is eleven planes of floats; a sigma map has up to eight planes of weights.
     let filtered = if params.measure == Measure::Steerable { 44 } else { 0 };
-    let mapped = if sigma_map.is_some() { 48 } else { 0 };
-    let pixel = filtered + mapped + (photo.byte_len() / (pw * ph)) as u64;
-    let need = stationary::memory_bytes((ph, pw), (height, width))
-        .checked_add((width * height) as u64 * pixel);
-    ensure_available(&format!("a {width}x{height} tile from a {pw}x{ph} photo"), need)?;
-    Ok((width, height))
-}
-
-/// Where the photo may be used: the caller's mask and the photo's own alpha; `None` is everywhere.
-pub(super) fn usable_mask(photo: &Picture, mask: Option<&Mask>) -> Result<Option<Mask>> {
-    if let Some(mask) = mask {
-        mask.ensure_size(photo.height(), photo.width())?;
-    }
-    let both = match (mask, Mask::from_alpha(photo)) {
-        (Some(mask), Some(alpha)) => Some(mask.and(&alpha)?),
-        (Some(mask), None) => Some(mask.clone()),
-        (None, alpha) => alpha,
+    let mapped = if inputs.sigma_map.is_some() { 48 } else { 0 };
+    let measured = (width * height) as u64 * (filtered + mapped);
+    // Every tile with its source map stays until the last is made; flattened photos are copies.
+    let tile = (width * height) as u64 * (photo.byte_len() / (pw * ph)) as u64;
+    let others = (tile + 12 * (width * height) as u64).checked_mul(count as u64 - 1);
+    let bytes: u64 = photos.iter().map(|photo| photo.byte_len() as u64).sum();
+    let flat = if params.flatten > 0.0 { bytes } else { 0 };
+    let sizes: Vec<_> = photos.iter().map(|photo| (photo.height(), photo.width())).collect();
+    let symmetries = params.symmetry.list();
+    let work = stationary::memory_bytes(&sizes, symmetries, (height, width));
+    let need = others
+        .zip(work)
+        .and_then(|(others, work)| work.checked_add(tile + flat + measured + others));
+    let what = if count > 1 { format!("{count} tiles of") } else { "a tile of".to_owned() };
+    let from = match photos.len() * symmetries.len() {
+        1 => format!("a {pw}x{ph} photo"),
+        views => format!("{views} views of photos of {pw}x{ph} and so on"),
     };
-    Ok(both.filter(|m| m.count() < m.usable().len()))
+    ensure_available(&format!("{what} {width}x{height} from {from}"), need)?;
+    Ok((width, height))
 }
 
 fn plan(
@@ -447,14 +351,14 @@ fn plan(
 }
 
 fn costs(
-    photo: &Picture,
+    photos: &[&Picture],
     picture: &Picture,
     map: Option<&SourceMap>,
     params: &TileParams,
     sigma_map: Option<&SigmaMap>,
     wrap: Wrap,
 ) -> Costs {
-    let model = ColorModel::new(photo);
+    let model = ColorModel::new(photos[0]);
     let mut pixels = model.averaging_pixels(picture);
     model.space().convert_row(&mut pixels);
     let (height, width) = (picture.height(), picture.width());
@@ -466,7 +370,7 @@ fn costs(
         other => other.cost(&pixels, domain, &evenness.window((height, width), domain)),
     };
     Costs {
-        texture: map.map(|map| texture::cost_bound(picture, photo, map, params.patch, wrap)),
+        texture: map.map(|map| texture::cost_bound(picture, photos, map, params.patch, wrap)),
         stationarity,
         stationarity_by_measure: params.evenness(sigma_map).map(by_measure),
     }

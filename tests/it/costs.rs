@@ -7,9 +7,9 @@ use texforge::search::patchmatch::Wrap;
 use texforge::signal::measure::Statistic;
 use texforge::signal::window::Domain;
 use texforge::{
-    Axis, Ctx, Encoding, Error, Guides, MapKind, Mask, Method, Picture, Quality, Result, Samples,
-    Simd, Size, SourceMap, TextureCost, TextureCostParams, Tile, TileParams, texture_cost, tile,
-    tile_guided,
+    Axis, Ctx, Encoding, Error, Inputs, MapKind, Mask, Method, Picture, Quality, Result, Samples,
+    Simd, Size, SourceMap, Symmetries, TextureCost, TextureCostParams, Tile, TileParams,
+    texture_cost, tile, tiles,
 };
 
 use crate::support::exemplar::{grain, hash, pebbles, stained};
@@ -250,8 +250,9 @@ mod trace {
     const METHODS: [Method; 3] = [Method::Stationary, Method::WrapOnly, Method::NoWrap];
 
     fn traced(photo: &Picture, params: &TileParams) -> Tile {
-        tile_guided(&ctx(2), photo, Guides { trace: true, ..Guides::default() }, params)
+        tiles(&ctx(2), &Inputs { trace: true, ..Inputs::new(photo) }, params, 1)
             .expect("a tile")
+            .remove(0)
     }
 
     #[test]
@@ -299,6 +300,18 @@ mod trace {
         assert!(traced(&exemplar.picture(), &blended).trace.is_empty(), "no iterations");
     }
 
+    fn watched(
+        ctx: &Ctx,
+        photo: &Picture,
+        plan: &stationary::Plan,
+        watch: stationary::Watch<'_>,
+    ) -> Result<SourceMap> {
+        let photos = [(photo, None)];
+        let exemplar =
+            stationary::Exemplar::new(ctx, &photos, Symmetries::None.list(), plan, true)?;
+        stationary::run(ctx, &exemplar, plan, Some(watch))
+    }
+
     #[test]
     fn every_step_has_the_costs_of_its_picture() {
         let photo = pebbles(80, 84, 3).picture();
@@ -323,7 +336,7 @@ mod trace {
             seen.push((look.level, look.iteration, measured(look)?));
             Ok(())
         };
-        stationary::run(&ctx(2), &photo, None, &plan, Some(&mut watch)).expect("a map");
+        watched(&ctx(2), &photo, &plan, &mut watch).expect("a map");
         assert_eq!(seen.len(), trace.len());
         for ((level, iteration, (texture, stationarity)), step) in seen.iter().zip(&trace) {
             assert_eq!((*level, *iteration), (step.level, step.iteration));
@@ -340,10 +353,11 @@ mod trace {
     /// Both costs of a look: distances of patches of 5 x 5 to those that the map names, window of a
     /// fifth of the shorter side.
     fn measured(look: &Look<'_>) -> Result<(f64, f64)> {
-        let tile = look.map.apply(look.exemplar, MapKind::Color)?;
-        let (e, f) = (lab(look.exemplar, look.exemplar), lab(look.exemplar, &tile));
+        let photo = &look.photos[0];
+        let tile = look.map.apply(photo, MapKind::Color)?;
+        let (e, f) = (lab(photo, photo), lab(photo, &tile));
         let (h, w) = (tile.height() as i64, tile.width() as i64);
-        let (eh, ew) = (look.exemplar.height() as i64, look.exemplar.width() as i64);
+        let (eh, ew) = (photo.height() as i64, photo.width() as i64);
         let mut sum = 0.0;
         for i in 0..h * w {
             let [sy, sx] = look.map.positions()[i as usize].map(i64::from);
@@ -379,7 +393,7 @@ mod trace {
             looks += 1;
             if looks == 3 { Err(Error::Cancelled) } else { Ok(()) }
         };
-        let result = stationary::run(&ctx(0), &photo, None, &plan, Some(&mut watch));
+        let result = watched(&ctx(0), &photo, &plan, &mut watch);
         assert!(matches!(result, Err(Error::Cancelled)), "{result:?}");
         assert_eq!(looks, 3);
     }

@@ -6,8 +6,10 @@ mod golden;
 mod house;
 mod io;
 mod measures;
+mod options;
 mod quality;
 mod search;
 #[path = "../support/mod.rs"]
 mod support;
 mod tile;
+mod views;

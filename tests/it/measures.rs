@@ -160,7 +160,7 @@ mod sigma_map {
     use texforge::image::color::ColorModel;
     use texforge::signal::measure::Statistic;
     use texforge::signal::window::{Domain, Window};
-    use texforge::{ErrorKind, Guides, SigmaMap, tile_guided};
+    use texforge::{ErrorKind, Inputs, SigmaMap, tiles};
 
     const SIDE: usize = 128;
 
@@ -171,9 +171,9 @@ mod sigma_map {
     }
 
     fn guided(photo: &Picture, map: &SigmaMap, seed: u64, params: &TileParams) -> Tile {
-        let guides = Guides { sigma_map: Some(map), ..Guides::default() };
+        let inputs = Inputs { sigma_map: Some(map), ..Inputs::new(photo) };
         let ctx = Ctx::new(seed, 2).expect("pool");
-        tile_guided(&ctx, photo, guides, params).expect("a tile")
+        tiles(&ctx, &inputs, params, 1).expect("a tile").remove(0)
     }
 
     /// How uneven the left and the right half are within a small window.
@@ -222,8 +222,8 @@ mod sigma_map {
             let run = |threads: usize, simd: Simd| {
                 let mut ctx = Ctx::new(3, threads).expect("pool");
                 ctx.simd = simd;
-                let guides = Guides { sigma_map: Some(&map), ..Guides::default() };
-                let tile = tile_guided(&ctx, &photo, guides, &params).expect("a tile");
+                let inputs = Inputs { sigma_map: Some(&map), ..Inputs::new(&photo) };
+                let tile = tiles(&ctx, &inputs, &params, 1).expect("a tile").remove(0);
                 (tile.picture, tile.report.costs)
             };
             let want = run(1, Simd::Scalar);
@@ -237,10 +237,10 @@ mod sigma_map {
     fn a_map_of_another_size_is_refused() {
         let photo = grain(64, 64, 1).picture();
         let map = map(31, |_| 0.1);
-        let guides = Guides { sigma_map: Some(&map), ..Guides::default() };
+        let inputs = Inputs { sigma_map: Some(&map), ..Inputs::new(&photo) };
         let ctx = Ctx::new(0, 1).expect("pool");
         let params = params(Measure::Histogram, 2, 32);
-        let error = tile_guided(&ctx, &photo, guides, &params).expect_err("refused");
+        let error = tiles(&ctx, &inputs, &params, 1).expect_err("refused");
         assert_eq!(error.kind(), ErrorKind::SizeMismatch);
         let said = "the sigma map is 31x31 pixels, expected 32x32; \
                     a sigma map must have the size of the tile";

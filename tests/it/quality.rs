@@ -420,7 +420,7 @@ mod costs {
             let map = SourceMap::new((24, 26), (40, 44), (0..24 * 26).map(place).collect());
             let map = map.expect("map");
             let tile = map.apply(&photo, MapKind::Color).expect("gather");
-            cost_bound(&tile, &photo, &map, PATCH, wrap)
+            cost_bound(&tile, &[&photo], &map, PATCH, wrap)
         };
         assert_eq!(cost(&|i| [i / 26 + 7, i % 26 + 3]), 0.0, "a crop");
         let shuffled = cost(&|i| [i * 17 % 40, i * 29 % 44]);

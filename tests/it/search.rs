@@ -1,6 +1,7 @@
 //! The search room against naive twins that are obviously right.
 
 use texforge::base::rng::Rng;
+use texforge::search::atlas::Atlas;
 use texforge::search::field::{Field, Pos};
 use texforge::search::patch::{
     CODE_MAX, Kernel, MatchImage, PATCH_MAX, WithKernel, detected, distance_squared, with_kernel,
@@ -386,7 +387,7 @@ mod fields {
             let usage = PlaceCost::of_usage(&field, &source, 100.0);
             passes(&ctx(), (&target, &source), &usage, wrap, 8, 0..6, &mut field);
             all_usable(&field, "searched");
-            all_usable(&field.upsampled(31, 31, &source, 1), "upsampled");
+            all_usable(&field.upsampled((31, 31), &source, &source, 1), "upsampled");
         }
     }
 
@@ -463,7 +464,7 @@ mod fields {
         let pos = (0..40 * 40).map(|i| Pos::new(i / 40 + 10 - 2, i % 40 + 30 - 2)).collect();
         let field = Field { height: 40, width: 40, pos };
         assert!(field.pos.iter().all(|p| p.y() < coarse.rows() && p.x() < coarse.cols()));
-        let fine = field.upsampled(80, 80, &source, 0);
+        let fine = field.upsampled((80, 80), &coarse, &source, 0);
         let offset = |i: usize| {
             let p = fine.pos[i];
             [p.y() + 2 - i / 80, p.x() + 2 - i % 80]
@@ -574,6 +575,7 @@ mod settling {
     fn energy_never_rises_and_the_mask_is_kept() {
         let size = (40, 36);
         let source = smooth_image(size.0, size.1, 4);
+        let atlas = Atlas::plain(source.height(), source.width());
         let usable: Vec<bool> =
             (0..40 * 36).map(|i| !(i / 36 > 20 && i % 36 < 15) && i % 31 != 0).collect();
         let ctx = ctx();
@@ -581,7 +583,13 @@ mod settling {
         let (h, w) = (32, 24);
         let target = smooth_image(h, w, 300);
         for wrap in WRAPS {
-            let canvas = Canvas { source: &source, usable: Some(&usable), target: &target, wrap };
+            let canvas = Canvas {
+                source: &source,
+                atlas: &atlas,
+                usable: Some(&usable),
+                target: &target,
+                wrap,
+            };
             let mut from = pieces(h, w, &usable, size);
             let first = energy(&canvas, &from);
             let mut before = first;
@@ -604,8 +612,10 @@ mod settling {
     #[test]
     fn one_piece_stays_whatever_the_target_says() {
         let source = random_image(50, 50, 1);
+        let atlas = Atlas::plain(source.height(), source.width());
         let target = random_image(21, 30, 2);
-        let canvas = Canvas { source: &source, usable: None, target: &target, wrap: NONE };
+        let canvas =
+            Canvas { source: &source, atlas: &atlas, usable: None, target: &target, wrap: NONE };
         let whole: Vec<From> = (0..21 * 30).map(|i| [i / 30 + 11, i % 30 + 20]).collect();
         let mut from = whole.clone();
         seams::settle(&ctx(), &canvas, &mut from, 3).expect("settles");
@@ -615,8 +625,10 @@ mod settling {
     #[test]
     fn settling_does_not_depend_on_threads() {
         let source = smooth_image(40, 36, 4);
+        let atlas = Atlas::plain(source.height(), source.width());
         let target = smooth_image(33, 25, 300);
-        let canvas = Canvas { source: &source, usable: None, target: &target, wrap: BOTH };
+        let canvas =
+            Canvas { source: &source, atlas: &atlas, usable: None, target: &target, wrap: BOTH };
         let run = |threads: usize| {
             let ctx = Ctx::new(0, threads).expect("pool");
             let mut from = pieces(33, 25, &[true; 40 * 36], (40, 36));

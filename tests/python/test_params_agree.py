@@ -59,3 +59,12 @@ def test_ranges_in_the_docs_are_those_of_the_core(function: Callable[..., object
             text = doc[doc.index(f" {entry['name']} : ") :][:260]
             assert low in text, entry
             assert high in text, entry
+
+
+def test_the_options_of_variants_are_those_of_a_tile() -> None:
+    signature = inspect.signature(texforge.tile)
+    options = [p.name for p in signature.parameters.values() if p.kind is p.KEYWORD_ONLY]
+    hints = typing.get_type_hints(texforge.TileOptions)
+    assert list(hints) == options
+    tile_hints = typing.get_type_hints(texforge.tile)
+    assert hints == {name: tile_hints[name] for name in options}

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import texforge
 from texforge import _texforge
 
@@ -36,11 +37,22 @@ def test_the_table_lists_every_parameter_its_default_and_its_words() -> None:
 
 
 def test_the_commands_run_as_they_stand(tmp_path: Path) -> None:
-    for name in ("photo.jpg", "usable.png", "scan_nrm.png", "scan_rough.png"):
+    second = ("photo_2.jpg", "scan_nrm_2.png", "scan_rough_2.png")
+    for name in (
+        "photo.jpg",
+        "usable.png",
+        "stains.png",
+        "scan_nrm.png",
+        "scan_rough.png",
+        *second,
+    ):
         array = noise(96, 128)
         array[:48] |= 128  # Usable enough as a mask.
+        if name == "stains.png":
+            array = np.zeros_like(array)
+            array[:20, :20] = 255
         texforge.write_image(tmp_path / name, array, kind="color" if "photo" in name else "data")
-    lines = [line for block in blocks("sh") for line in block.splitlines()]
+    lines = [line for block in blocks("sh") for line in block.replace("\\\n", "").splitlines()]
     commands = [shlex.split(line)[1:] for line in lines if line.startswith("texforge ")]
     assert len(commands) > 5
     for command in commands:
@@ -53,6 +65,8 @@ def test_the_commands_run_as_they_stand(tmp_path: Path) -> None:
         )
         assert result.returncode == 0, (command, result.stderr)
         outputs = [command[command.index("-o") + 1]] if "-o" in command else []
+        if "--variants" in command:
+            outputs = ["several-1.png", "several-2.png", "several-3.png"]
         assert all((tmp_path / output).is_file() for output in outputs), command
 
 

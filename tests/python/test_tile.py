@@ -102,6 +102,73 @@ def test_no_masked_pixel_is_used(seed: int, share: float) -> None:
     assert usable[tuple(np.moveaxis(source_map_of(tile), -1, 0))].all()
 
 
+def test_nothing_near_an_avoided_pixel_is_used(photo: Photo) -> None:
+    marks = np.zeros((48, 64), bool)
+    marks[10:14, 20:30] = True
+    rows, columns = np.mgrid[:48, :64]
+    marked = np.argwhere(marks)
+    far = np.hypot(rows[..., None] - marked[:, 0], columns[..., None] - marked[:, 1]).min(axis=2)
+    plain = texforge.tile(photo, **QUICK)
+    assert (far[tuple(np.moveaxis(source_map_of(plain), -1, 0))] <= 4).any()
+    for usable in (None, np.arange(48)[:, np.newaxis].repeat(64, axis=1) < 40):
+        tile = texforge.tile(photo, avoid=marks, avoid_grow=4, mask=usable, **QUICK)
+        y, x = np.moveaxis(source_map_of(tile), -1, 0)
+        assert (far[y, x] > 4).all()
+        assert usable is None or usable[y, x].all()
+
+
+def test_variants_are_the_tiles_of_the_seeds_that_follow(photo: Photo) -> None:
+    height = photo[..., 0]
+    tiles = texforge.tile_variants(photo, 3, seed=5, maps={"height": height}, **QUICK)
+    assert [tile.seed for tile in tiles] == [5, 6, 7]
+    for tile in tiles:
+        alone = texforge.tile(photo, seed=tile.seed, maps={"height": height}, **QUICK)
+        assert tile.image.tobytes() == alone.image.tobytes()
+        assert tile.costs == alone.costs
+        assert np.array_equal(tile.maps["height"], alone.maps["height"])
+    assert len({tile.image.tobytes() for tile in tiles}) == 3
+    fractions: list[float] = []
+    texforge.tile_variants(photo, 2, progress=fractions.append, **QUICK)
+    assert fractions == sorted(fractions)
+    assert fractions[-1] == 1.0
+
+
+def test_variants_that_cannot_be(photo: Photo) -> None:
+    for count in (0, -1, 1001, 2.5, True):
+        with pytest.raises(texforge.ParameterError, match="`count`"):
+            texforge.tile_variants(photo, count, **QUICK)  # type: ignore[arg-type]
+    with pytest.raises(texforge.ParameterError, match="`seed`"):
+        texforge.tile_variants(photo, 2, seed=2**64 - 1, **QUICK)
+    with pytest.raises(texforge.ParameterError, match="`variants`"):
+        texforge.tile_variants(photo, 2, method="make-seamless", **QUICK)
+    with pytest.raises(TypeError, match="blorb"):
+        texforge.tile_variants(photo, 2, blorb=1)  # type: ignore[call-arg]
+
+
+@pytest.mark.parametrize("dtype", ["uint8", "uint16", "float16", "float32"])
+def test_flatten_takes_a_slope_of_light_out(dtype: str) -> None:
+    grain = noise(64, 96, None) / 255.0 * 0.3 + 0.35
+    light = np.linspace(0.3, 1.2, 96) * np.linspace(1.2, 0.7, 64)[:, np.newaxis]
+    full = {"uint8": 255, "uint16": 65535}.get(dtype, 1)
+    photo = ((grain * light) ** (1 / 2.2) * full).astype(dtype)
+    kinds = {"height": noise(64, 96, None, seed=3)}
+
+    def left(tile: texforge.Tile) -> float:
+        """Return by how much the light over the tile's pixels still differs."""
+        y, x = np.moveaxis(source_map_of(tile), -1, 0)
+        value = np.maximum(tile.image.astype(float) / full, 1e-3) ** 2.2
+        return float(np.std(np.log(value / grain[y, x])))
+
+    plain = texforge.tile(photo, method="wrap-only", **QUICK)
+    flat = texforge.tile(photo, method="wrap-only", flatten=0.3, maps=kinds, **QUICK)
+    assert flat.image.dtype == photo.dtype
+    assert left(plain) > 0.25
+    assert left(flat) < 0.1
+    assert any("flattened" in note for note in flat.report["notes"])
+    y, x = np.moveaxis(source_map_of(flat), -1, 0)
+    assert np.array_equal(flat.maps["height"], kinds["height"][y, x])
+
+
 @pytest.mark.parametrize("dtype", ["bool", "uint8", "uint16", "float32"])
 def test_masks_of_every_type_mean_the_same(photo: Photo, dtype: str) -> None:
     usable = np.zeros((48, 64), bool)

@@ -9,10 +9,16 @@ use super::place::put;
 use super::{Format, Source, exr as planes, guarded, load};
 use crate::base::error::{Error, Result};
 use crate::image::material::MapKind;
-use crate::image::sourcemap::SourceMap;
+use crate::image::sourcemap::{Origin, SourceMap};
+use crate::image::symmetry::Symmetry;
 
-/// Version of the file's layout; readers refuse others.
-const VERSION: u32 = 1;
+/// Versions of the file's layout: positions in one photo; the same with an origin each, in one
+/// photo or several. Readers refuse others.
+const PLAIN: u32 = 1;
+const VIEWS: u32 = 2;
+
+/// The channels, in the order in which EXR keeps them; [`PLAIN`] has the last two.
+const CHANNELS: [&str; 4] = ["source.photo", "source.symmetry", "source.x", "source.y"];
 
 /// What stands in the attribute `texforge`.
 #[derive(Serialize, Deserialize)]
@@ -23,6 +29,9 @@ struct Header {
     width: usize,
     #[serde(rename = "source_height")]
     height: usize,
+    /// Width and height of the photos after the first.
+    #[serde(rename = "further_sources", default, skip_serializing_if = "Vec::is_empty")]
+    further: Vec<(usize, usize)>,
 }
 
 /// Writes the bytes of [`encode_source_map`].
@@ -34,7 +43,9 @@ pub fn write_source_map(path: &Path, map: &SourceMap, force: bool) -> Result<()>
 }
 
 /// A source map as the bytes of an EXR file: two 32-bit integer channels `source.x` and
-/// `source.y`, and an attribute `texforge` with the layout's version and the size of the source.
+/// `source.y`, and an attribute `texforge` with the layout's version and the size of the source. If
+/// pixels have origins, two more channels `source.photo` (from 0 on) and `source.symmetry`
+/// ([`Symmetry::code`]), and the sizes of all photos.
 ///
 /// # Errors
 /// [`Error::Format`] if `path`, where the bytes are to go, does not end in `.exr`.
@@ -47,10 +58,19 @@ pub fn encode_source_map(map: &SourceMap, path: &Path) -> Result<Vec<u8>> {
     }
     let internal = |message: String| Error::Internal { message };
     let (height, width) = map.source_size();
-    let header = Header { version: VERSION, width, height };
+    let version = if map.origins().is_some() { VIEWS } else { PLAIN };
+    let further = map.source_sizes()[1..].iter().map(|&(h, w)| (w, h)).collect();
+    let header = Header { version, width, height, further };
     let header = serde_json::to_string(&header).map_err(|e| internal(e.to_string()))?;
-    let plane = |k: usize| FlatSamples::U32(map.positions().iter().map(|p| p[k]).collect());
-    let channels = vec![("source.x".to_owned(), plane(1)), ("source.y".to_owned(), plane(0))];
+    let plane = |name: &str, values: Vec<u32>| (name.to_owned(), FlatSamples::U32(values));
+    let position = |k: usize| map.positions().iter().map(|p| p[k]).collect();
+    let mut channels = Vec::new();
+    if let Some(origins) = map.origins() {
+        channels.push(plane(CHANNELS[0], origins.iter().map(|o| o.photo.into()).collect()));
+        let codes = origins.iter().map(|o| o.symmetry.code().into());
+        channels.push(plane(CHANNELS[1], codes.collect()));
+    }
+    channels.extend([plane(CHANNELS[2], position(1)), plane(CHANNELS[3], position(0))]);
     planes::encode_planes((map.width(), map.height()), channels, None, Some(&header))
         .map_err(internal)
 }
@@ -78,22 +98,45 @@ fn decode(source: &Source) -> Result<SourceMap> {
     let record = planes.record.ok_or_else(|| no_source_map(source, "its header is missing"))?;
     let header: Header = serde_json::from_str(&record)
         .map_err(|_| no_source_map(source, "its header does not say so"))?;
-    if header.version != VERSION {
-        return Err(source.bad(format!(
-            "the source map has version {}, this program reads version {VERSION}; make it again",
-            header.version
-        )));
-    }
-    let [(x_name, FlatSamples::U32(x)), (y_name, FlatSamples::U32(y))] = &planes.channels[..]
-    else {
-        return Err(no_source_map(source, "it does not have two channels of 32-bit integers"));
+    let names = match header.version {
+        PLAIN => &CHANNELS[2..],
+        VIEWS => &CHANNELS[..],
+        other => {
+            return Err(source.bad(format!(
+                "the source map has version {other}, this program reads versions {PLAIN} and {VIEWS}; \
+                 make it again"
+            )));
+        }
     };
-    if (x_name.as_str(), y_name.as_str()) != ("source.x", "source.y") {
-        return Err(no_source_map(source, "its channels are not source.x and source.y"));
+    let whole = |(_, plane): &(String, FlatSamples)| match plane {
+        FlatSamples::U32(values) => Some(values.clone()),
+        _ => None,
+    };
+    let values: Option<Vec<Vec<u32>>> = planes.channels.iter().map(whole).collect();
+    let Some(values) = values.filter(|v| v.len() == names.len()) else {
+        let why = format!("it does not have {} channels of 32-bit integers", names.len());
+        return Err(no_source_map(source, &why));
+    };
+    if planes.channels.iter().map(|(name, _)| name).ne(names) {
+        let why = format!("its channels are not {}", names.join(" and "));
+        return Err(no_source_map(source, &why));
     }
+    let (x, y) = (&values[names.len() - 2], &values[names.len() - 1]);
     let positions = y.iter().zip(x).map(|(y, x)| [*y, *x]).collect();
-    let source_size = (header.height, header.width);
-    SourceMap::new((planes.height, planes.width), source_size, positions)
+    let origin = |(&photo, &code): (&u32, &u32)| {
+        let photo = u16::try_from(photo).ok()?;
+        Some(Origin { photo, symmetry: Symmetry::from_code(code)? })
+    };
+    let origins: Option<Vec<Origin>> = match &values[..] {
+        [photos, codes, ..] if header.version == VIEWS => {
+            photos.iter().zip(codes).map(origin).collect()
+        }
+        _ => Some(Vec::new()),
+    };
+    let origins = origins.ok_or_else(|| no_source_map(source, "it names no photo or symmetry"))?;
+    let further = header.further.iter().map(|&(w, h)| (h, w));
+    let sources = [(header.height, header.width)].into_iter().chain(further).collect();
+    SourceMap::of_views((planes.height, planes.width), sources, positions, origins)
         .map_err(|e| source.bad(e.to_string()))
 }
 
@@ -114,11 +157,22 @@ mod tests {
             let mix = |i: usize| (i as u64 + 1).wrapping_mul(u64::from(seed) | 1) as usize >> 7;
             let place = |i: usize| [(mix(2 * i) % source.0) as u32, (mix(2 * i + 1) % source.1) as u32];
             let positions = (0..size.0 * size.1).map(place).collect();
-            let map = SourceMap::new(size, source, positions).expect("inside");
+            let mut maps = vec![SourceMap::new(size, source, positions).expect("inside")];
+            // The same positions, of two photos in all symmetries.
+            let origin = |i: usize| Origin {
+                photo: (mix(3 * i) % 2) as u16,
+                symmetry: Symmetry::ALL[mix(5 * i) % 8],
+            };
+            let origins = (0..size.0 * size.1).map(origin).collect();
+            let sources = vec![source, (source.0 + 3, source.1)];
+            let positions = maps[0].positions().to_vec();
+            maps.push(SourceMap::of_views(size, sources, positions, origins).expect("inside"));
+            for map in maps {
             let dir = tempfile::tempdir().expect("folder");
             let path = dir.path().join("map.exr");
             write_source_map(&path, &map, false).expect("write");
             prop_assert_eq!(read_source_map(&path).expect("read"), map);
+            }
         }
     }
 
@@ -143,13 +197,31 @@ mod tests {
         };
         refuse([("source.x", x()), ("source.y", y())], None, "header is missing");
         refuse([("source.x", x()), ("source.y", y())], Some("{}"), "does not say so");
-        let newer = good.replace("map\":1", "map\":2");
-        refuse([("source.x", x()), ("source.y", y())], Some(&newer), "version 2");
+        let newer = good.replace("map\":1", "map\":3");
+        refuse([("source.x", x()), ("source.y", y())], Some(&newer), "version 3");
+        let views = good.replace("map\":1", "map\":2");
+        refuse([("source.x", x()), ("source.y", y())], Some(&views), "4 channels");
         refuse([("R", x()), ("G", y())], Some(good), "source.x and source.y");
         let half = FlatSamples::F32(vec![2.0, 0.0]);
         refuse([("source.x", x()), ("source.y", half)], Some(good), "32-bit integers");
         let far = FlatSamples::U32(vec![3, 0]);
         refuse([("source.x", x()), ("source.y", far)], Some(good), "outside");
+
+        for (photo, symmetry, why) in
+            [(1, 0, "photo 2 of 1"), (0, 8, "symmetry"), (70_000, 0, "symmetry")]
+        {
+            let plane = |name: &str, values| (name.to_owned(), FlatSamples::U32(values));
+            let channels = vec![
+                plane("source.photo", vec![0, photo]),
+                plane("source.symmetry", vec![0, symmetry]),
+                plane("source.x", vec![3, 0]),
+                plane("source.y", vec![2, 0]),
+            ];
+            let bytes = planes::encode_planes((2, 1), channels, None, Some(&views)).expect("EXR");
+            put(&path, &bytes, true).expect("write");
+            let error = read_source_map(&path).expect_err(why);
+            assert!(error.to_string().contains(why), "{error}");
+        }
 
         std::fs::write(dir.path().join("text.exr"), "hello").expect("text");
         let error = read_source_map(&dir.path().join("text.exr")).expect_err("text");

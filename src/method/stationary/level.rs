@@ -5,9 +5,11 @@ use crate::base::error::{Error, Result};
 use crate::image::color::{ColorModel, MatchSpace};
 use crate::image::mask::Mask;
 use crate::image::picture::{Encoding, Picture, Samples};
+use crate::image::symmetry::Symmetry;
 use crate::method::stationary::{CONTRAST, Plan};
 use rayon::prelude::*;
 
+use crate::search::atlas::Atlas;
 use crate::search::field::Pos;
 use crate::search::patch::{CODE_MAX, MatchImage};
 use crate::search::place_cost::PlaceCost;
@@ -50,22 +52,20 @@ struct Codes {
 
 impl Codes {
     /// Covers 99.8 % of each channel's usable values.
-    fn covering(pixels: &[[f32; 3]], space: MatchSpace, usable: Option<&[bool]>) -> Self {
-        // Twenty thousand samples fix the ends well enough.
-        let step = (pixels.len() / 20_000).max(1);
-        let mut sample: Vec<[f32; 3]> = (0..pixels.len())
-            .step_by(step)
-            .filter(|&i| usable.is_none_or(|u| u[i]))
-            .map(|i| pixels[i])
-            .collect();
+    fn covering(photos: &[Reduced], space: MatchSpace) -> Self {
+        let usable = |photo: &Reduced, i: usize| photo.usable.as_ref().is_none_or(|u| u[i]);
+        let take = |step: fn(usize) -> usize| {
+            let each = |photo: &Reduced| {
+                let all = (0..photo.pixels.len()).step_by(step(photo.pixels.len()));
+                all.filter(|&i| usable(photo, i)).map(|i| photo.pixels[i]).collect::<Vec<_>>()
+            };
+            photos.iter().flat_map(each).collect::<Vec<_>>()
+        };
+        // Twenty thousand samples of a photo fix the ends well enough.
+        let mut sample = take(|n| (n / 20_000).max(1));
         if sample.is_empty() {
             // A few usable pixels between the samples: take them all.
-            sample = pixels
-                .iter()
-                .zip(usable.unwrap_or_default())
-                .filter(|(_, u)| **u)
-                .map(|(px, _)| *px)
-                .collect();
+            sample = take(|_| 1);
         }
         space.convert_row(&mut sample);
         let cut = sample.len() / 1000;
@@ -106,66 +106,89 @@ pub(super) struct Level {
     pub(super) quantiles: [Quantiles; 4],
     /// Uniformity cost of using a patch as often as the average, in squared codes.
     pub(super) usage_unit: f32,
+    /// The mean squared distance of a patch from the mean colour, in squared codes.
+    pub(super) patch_variance: f64,
     /// What rare places cost.
     pub(super) rarity: PlaceCost,
-    /// The exemplar as a picture, if somebody watches.
-    pub(super) exemplar: Option<Picture>,
+    /// The photos, if somebody watches.
+    pub(super) photos: Vec<Picture>,
 }
 
-/// All levels, finest first; with their exemplars as pictures if they are `watched`.
+/// A photo, as far as the pyramid has reduced it.
+struct Reduced {
+    /// Height and width of the photo itself.
+    full: (usize, usize),
+    /// Height and width now.
+    size: (usize, usize),
+    pixels: Vec<[f32; 3]>,
+    usable: Option<Vec<bool>>,
+}
+
+/// All levels, finest first, and where the finest one's source may be used (`None`: everywhere);
+/// with the photos as pictures if they are `watched`.
 ///
 /// # Errors
 /// [`Error::EmptyMask`] if no whole patch is usable at full size.
 pub(super) fn build(
     ctx: &Ctx,
-    photo: &Picture,
-    mask: Option<&Mask>,
+    photos: &[(&Picture, Option<&Mask>)],
+    symmetries: &[Symmetry],
     plan: &Plan,
     watched: bool,
-) -> Result<Vec<Level>> {
+) -> Result<(Vec<Level>, Option<Vec<bool>>)> {
     let (h, w) = plan.size;
-    let (mut eh, mut ew) = (photo.height(), photo.width());
-    let model = ColorModel::new(photo);
-    let mut pixels = model.averaging_pixels(photo);
+    let model = ColorModel::new(photos[0].0);
+    let reduced = |&(photo, mask): &(&Picture, Option<&Mask>)| {
+        let size = (photo.height(), photo.width());
+        let (pixels, usable) = (model.averaging_pixels(photo), mask.map(|m| m.usable().to_vec()));
+        Reduced { full: size, size, pixels, usable }
+    };
+    let mut reduced: Vec<Reduced> = photos.iter().map(reduced).collect();
     ctx.step(0)?;
-    let mut usable = mask.map(|m| m.usable().to_vec());
-    let n_usable = mask.map_or(eh * ew, Mask::count);
     let mut codes = None;
     let mut levels = Vec::new();
+    let mut finest_usable = None;
     for j in 0.. {
         let at = |n: usize| (n as f64 / RATIO.powi(j)).round() as usize;
         if j > 0 {
-            let to = (at(photo.height()), at(photo.width()));
             // The side before this one was still above the coarsest: go one below it.
             let above = (h.min(w) as f64 / RATIO.powi(j - 1)).round() as usize;
             if above <= COARSEST {
                 break;
             }
-            if to.0 < 2 * plan.patch || to.1 < 2 * plan.patch || at(h.min(w)) < plan.patch {
+            let small = |photo: &Reduced| at(photo.full.0.min(photo.full.1)) < 2 * plan.patch;
+            if reduced.iter().any(small) || at(h.min(w)) < plan.patch {
                 break;
             }
-            pixels = resized(&pixels, (eh, ew), to);
-            ctx.step(0)?;
-            usable = usable.map(|u| resized_mask(&u, (eh, ew), to));
-            (eh, ew) = to;
+            for photo in &mut reduced {
+                let to = (at(photo.full.0), at(photo.full.1));
+                photo.pixels = resized(&photo.pixels, photo.size, to);
+                ctx.step(0)?;
+                photo.usable = photo.usable.take().map(|u| resized_mask(&u, photo.size, to));
+                photo.size = to;
+            }
         }
         let size = (at(h), at(w));
-        match level(
-            &pixels,
-            model.space(),
-            (eh, ew),
-            usable.as_deref(),
-            size,
-            plan.patch,
-            &mut codes,
-        ) {
-            Some(level) => {
-                let exemplar = watched.then(|| shown(&pixels, model.space(), (eh, ew)));
-                levels.push(Level { exemplar: exemplar.transpose()?, ..level });
+        match level(&reduced, model.space(), symmetries, size, plan.patch, &mut codes) {
+            Some((mut level, usable)) => {
+                if watched {
+                    let shown = reduced.iter().map(|photo| shown(photo, model.space()));
+                    level.photos = shown.collect::<Result<_>>()?;
+                }
+                levels.push(level);
+                if j == 0 {
+                    finest_usable = usable;
+                }
             }
             // A thin mask leaves no patch at coarse levels: start with finer ones.
             None if j > 0 => break,
-            None => return Err(Error::EmptyMask { usable: n_usable, patch: plan.patch }),
+            None => {
+                let count = |(photo, mask): &(&Picture, Option<&Mask>)| {
+                    mask.map_or(photo.height() * photo.width(), Mask::count)
+                };
+                let usable = photos.iter().map(count).sum();
+                return Err(Error::EmptyMask { usable, patch: plan.patch });
+            }
         }
     }
     // Only the coarsest level matches colours; without projection it is the paper's plain target.
@@ -181,42 +204,55 @@ pub(super) fn build(
     if plan.rarity > 0.0 {
         rate(ctx, &mut levels);
     }
-    Ok(levels)
+    Ok((levels, finest_usable))
 }
 
 /// Finds what is rare at the coarse levels; the finer ones take it over.
 fn rate(ctx: &Ctx, levels: &mut [Level]) {
-    let mut coarser: Option<PlaceCost> = None;
-    for level in levels.iter_mut().rev() {
+    for j in (0..levels.len()).rev() {
+        let (fine, coarse) = levels.split_at_mut(j + 1);
+        let level = &mut fine[j];
         let side = level.source.rows().min(level.source.cols());
-        level.rarity = match coarser {
-            Some(coarser) if side > RARITY_SIDE => coarser.resized(&level.source),
+        level.rarity = match coarse.first() {
+            Some(coarser) if side > RARITY_SIDE => {
+                coarser.rarity.resized(&coarser.source, &level.source)
+            }
             _ => rarity(ctx, &level.source),
         };
-        coarser = Some(level.rarity.clone());
     }
 }
 
+/// A level, and where its source may be used.
 fn level(
-    pixels: &[[f32; 3]],
+    photos: &[Reduced],
     space: MatchSpace,
-    (eh, ew): (usize, usize),
-    usable: Option<&[bool]>,
+    symmetries: &[Symmetry],
     size: (usize, usize),
     patch: usize,
     codes: &mut Option<Codes>,
-) -> Option<Level> {
-    let codes = *codes.get_or_insert_with(|| Codes::covering(pixels, space, usable));
-    let mut colors = MatchImage::new(eh, ew);
-    colors.fill_rows(|y, row| {
-        let mut lab = pixels[y * ew..][..ew].to_vec();
-        space.convert_row(&mut lab);
-        for (px, lab) in row.iter_mut().zip(lab) {
-            let [l, a, b] = codes.encode(lab);
-            *px = [l, a, b, 0];
-        }
-    });
-    let source = Source::new(with_contrast(&colors), patch, usable)?;
+) -> Option<(Level, Option<Vec<bool>>)> {
+    let codes = *codes.get_or_insert_with(|| Codes::covering(photos, space));
+    let image = |photo: &Reduced| {
+        let (h, w) = photo.size;
+        let mut colors = MatchImage::new(h, w);
+        colors.fill_rows(|y, row| {
+            let mut lab = photo.pixels[y * w..][..w].to_vec();
+            space.convert_row(&mut lab);
+            for (px, lab) in row.iter_mut().zip(lab) {
+                let [l, a, b] = codes.encode(lab);
+                *px = [l, a, b, 0];
+            }
+        });
+        with_contrast(&colors)
+    };
+    let sizes: Vec<(usize, usize)> = photos.iter().map(|photo| photo.size).collect();
+    let atlas = Atlas::new(&sizes, symmetries)?;
+    let flags: Vec<Option<&[bool]>> = photos.iter().map(|photo| photo.usable.as_deref()).collect();
+    let flags = atlas.flags(&flags);
+    let usable = flags.as_deref();
+    let image = atlas.image(photos.iter().map(image).collect());
+    let (eh, ew) = (atlas.height(), atlas.width());
+    let source = Source::of_atlas(image, patch, usable, atlas)?;
     let usable_pixel = |i: &usize| usable.is_none_or(|u| u[*i]);
     // An odd step visits every column of a picture of even width.
     let step = (eh * ew / 400_000) | 1;
@@ -260,40 +296,55 @@ fn level(
             moment(2) - moment(1) * moment(1)
         })
         .sum();
+    let patch_variance = variance * (patch * patch) as f64;
     let usage_unit = (USAGE_SHARE * variance * (patch * patch) as f64) as f32;
     let rarity = PlaceCost::free(&source);
-    Some(Level { size, source, quantiles, usage_unit, rarity, exemplar: None })
+    let photos = Vec::new();
+    let level = Level { size, source, quantiles, usage_unit, patch_variance, rarity, photos };
+    Some((level, flags))
 }
 
-/// Averaging pixels as a picture that has the same colours to match.
-fn shown(pixels: &[[f32; 3]], space: MatchSpace, (h, w): (usize, usize)) -> Result<Picture> {
+/// A photo as a picture that has the same colours to match.
+fn shown(photo: &Reduced, space: MatchSpace) -> Result<Picture> {
     let encoding = match space {
         MatchSpace::Lab => Encoding::Linear,
         MatchSpace::Data => Encoding::Data,
     };
-    Picture::new(h, w, 3, Samples::F32(pixels.as_flattened().to_vec()), encoding)
+    let (h, w) = photo.size;
+    Picture::new(h, w, 3, Samples::F32(photo.pixels.as_flattened().to_vec()), encoding)
 }
 
-/// The exemplar's typical local histogram of each colour: the median over all places of each
-/// quantile. Rare stains are in few windows and drop out of it.
+/// The exemplar's typical local histogram of each colour: the median over all places of a photo of
+/// each quantile, those of several photos pooled. Rare stains are in few windows and drop out of it.
 fn typical_quantiles(source: &Source) -> [Option<Quantiles>; CONTRAST] {
-    let (height, width) = (source.rows(), source.cols());
-    let half = source.patch / 2;
-    // The middles of all patches, and which of the patches are usable.
-    let (soft, usable): (Vec<Soft>, Vec<bool>) = (0..height * width)
-        .into_par_iter()
-        .map(|i| {
-            let (y, x) = (i / width, i % width);
-            let px = source.image.pixel(y + half, x + half);
-            (px.map(|c| u16::from(c) << SOFT_BITS), source.is_usable(Pos::new(y, x)))
-        })
-        .unzip();
-    let domain = Domain { height, width, wrap_y: false, wrap_x: false };
-    let sigma = TYPICAL_WINDOW * height.min(width) as f64;
-    std::array::from_fn(|k| {
-        let code = |i: usize| usable[i].then_some(soft[i][k]);
-        LocalDistributions::new(code, domain, sigma).typical()
-    })
+    let mut all = [const { Vec::new() }; CONTRAST];
+    for (i, view) in source.atlas.views().iter().enumerate() {
+        // Its other symmetries say the same of a photo.
+        if source.atlas.views()[..i].iter().any(|before| before.picture == view.picture) {
+            continue;
+        }
+        let height = view.size.0 - source.patch + 1;
+        let width = view.size.1 - source.patch + 1;
+        let half = source.patch / 2;
+        // The middles of all patches, and which of the patches are usable.
+        let (soft, usable): (Vec<Soft>, Vec<bool>) = (0..height * width)
+            .into_par_iter()
+            .map(|i| {
+                let (y, x) = (view.corner.0 + i / width, view.corner.1 + i % width);
+                let px = source.image.pixel(y + half, x + half);
+                (px.map(|c| u16::from(c) << SOFT_BITS), source.is_usable(Pos::new(y, x)))
+            })
+            .unzip();
+        let domain = Domain { height, width, wrap_y: false, wrap_x: false };
+        let sigma = TYPICAL_WINDOW * height.min(width) as f64;
+        let weight = usable.iter().filter(|&&ok| ok).count() as f64;
+        for (k, all) in all.iter_mut().enumerate() {
+            let code = |i: usize| usable[i].then_some(soft[i][k]);
+            let local = LocalDistributions::new(code, domain, sigma);
+            all.extend(local.typical().map(|typical| (typical, weight)));
+        }
+    }
+    all.map(|all| Quantiles::pooled(&all))
 }
 
 /// The codes with local contrast as the fourth: the standard deviation of the colour over the 5 x 5

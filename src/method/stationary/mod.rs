@@ -3,6 +3,7 @@
 //! Moritz, James, Haines, Ritschel, Weyrich: Texture Stationarization (2017), Algorithm 1. The
 //! same loop without wrap or without projection gives the baselines.
 
+mod balance;
 mod level;
 
 use rayon::prelude::*;
@@ -12,7 +13,9 @@ use crate::base::error::Result;
 use crate::image::mask::Mask;
 use crate::image::picture::Picture;
 use crate::image::sigma_map::SigmaMap;
-use crate::image::sourcemap::SourceMap;
+use crate::image::sourcemap::{Origin, SourceMap};
+use crate::image::symmetry::Symmetry;
+use crate::search::atlas::Atlas;
 use crate::search::field::{Field, Pos};
 use crate::search::patch::MatchImage;
 use crate::search::patchmatch::{self, Search, Wrap};
@@ -24,6 +27,7 @@ use crate::signal::measure::Statistic;
 use crate::signal::resample::resized;
 use crate::signal::window::{Domain, Window};
 
+use balance::Balance;
 use level::Level;
 
 /// Channel that holds local contrast; the three before it are the colour.
@@ -101,45 +105,79 @@ pub struct Look<'a> {
     pub level: usize,
     /// Iterations done at this level. The last look of all counts one more: the seams are settled.
     pub iteration: u32,
-    /// The photo at this level, as three channels of linear light (or data).
-    pub exemplar: &'a Picture,
-    /// Which of the exemplar's pixels each of the tile's is.
+    /// The photos at this level, as three channels of linear light (or data).
+    pub photos: &'a [Picture],
+    /// Which of their pixels each of the tile's is.
     pub map: SourceMap,
 }
 
 /// Is shown every iteration; an error from it ends the work.
 pub type Watch<'a> = &'a mut (dyn FnMut(&Look<'_>) -> Result<()> + Send);
 
-/// Synthesizes a texture from `photo`: where every output pixel comes from. Watching changes
-/// nothing in it.
+/// Photos, analysed: what all runs on them share.
+#[derive(Debug)]
+pub struct Exemplar {
+    /// Height and width of each photo.
+    sizes: Vec<(usize, usize)>,
+    /// Finest first.
+    levels: Vec<Level>,
+    /// Where the finest level's source may be used; `None` is everywhere.
+    usable: Option<Vec<bool>>,
+}
+
+impl Exemplar {
+    /// Analyses photos of one type, as far as their masks let them be used, in these symmetries, for
+    /// tiles of this plan; `watched` if a [`run`] will be.
+    ///
+    /// # Errors
+    /// See [`tile`](crate::tile).
+    pub fn new(
+        ctx: &Ctx,
+        photos: &[(&Picture, Option<&Mask>)],
+        symmetries: &[Symmetry],
+        plan: &Plan,
+        watched: bool,
+    ) -> Result<Self> {
+        let (levels, usable) = level::build(ctx, photos, symmetries, plan, watched)?;
+        let sizes = photos.iter().map(|(photo, _)| (photo.height(), photo.width())).collect();
+        Ok(Self { sizes, levels, usable })
+    }
+
+    /// Steps of progress that one [`run`] counts.
+    pub fn work(&self, plan: &Plan) -> u64 {
+        let area = |l: &Level| (l.size.0 * l.size.1) as u64;
+        let levels = self.levels.iter().enumerate();
+        levels
+            .map(|(j, l)| u64::from(effort(plan, l, j + 1 == self.levels.len()).0) * area(l))
+            .sum()
+    }
+}
+
+/// Synthesizes a texture from the exemplar: where every output pixel comes from. `ctx.begin` is the
+/// caller's. Watching changes nothing in it.
 ///
 /// # Errors
 /// See [`tile`](crate::tile); those of `watch`.
 pub fn run(
     ctx: &Ctx,
-    photo: &Picture,
-    mask: Option<&Mask>,
+    exemplar: &Exemplar,
     plan: &Plan,
     mut watch: Option<Watch<'_>>,
 ) -> Result<SourceMap> {
-    let levels = level::build(ctx, photo, mask, plan, watch.is_some())?;
+    let levels = &exemplar.levels;
     let n_coarse = levels.len() - 1;
-    let area = |l: &Level| (l.size.0 * l.size.1) as u64;
-    let work = levels
-        .iter()
-        .enumerate()
-        .map(|(j, l)| u64::from(effort(plan, l, j == n_coarse).0) * area(l));
-    ctx.begin(work.sum());
     let mut pass = 0;
+    let mut balance = Balance::new(exemplar.sizes.len());
     let mut field: Option<Field> = None;
     for (j, level) in levels.iter().enumerate().rev() {
         let (h, w) = level.size;
         let mut f = match field.take() {
             None => Field::random(h, w, &level.source, ctx.seed),
-            Some(coarse) => coarse.upsampled(h, w, &level.source, ctx.seed),
+            Some(field) => field.upsampled((h, w), &levels[j + 1].source, &level.source, ctx.seed),
         };
         let coarsest = j == n_coarse;
         let mut usage = PlaceCost::of_usage(&f, &level.source, plan.uniformity * level.usage_unit);
+        let areas = balance::areas(&level.source, exemplar.sizes.len());
         let (iterations, search) = effort(plan, level, coarsest);
         let apron = |wrap: bool| if wrap { 0 } else { plan.patch - 1 };
         let domain = Domain {
@@ -168,12 +206,17 @@ pub fn run(
             usage = now.averaged(&usage);
             let cost = usage.clone().plus(plan.rarity, &level.rarity);
             let search = Search { pass, ..search };
+            let unit = f64::from(plan.uniformity) * level.patch_variance;
+            let cost = match balance.costs(&f, &level.source, &areas, unit) {
+                Some(costs) => cost.with_picture_costs(&level.source, &costs),
+                None => cost,
+            };
             patchmatch::pass(ctx, &target, &level.source, &cost, plan.wrap, search, &mut f)?;
             pass += 1;
-            if let (Some(watch), Some(exemplar)) = (watch.as_mut(), &level.exemplar) {
-                let from = (exemplar.height(), exemplar.width());
-                let map = SourceMap::new((h, w), from, centers(&f, plan.patch))?;
-                watch(&Look { level: j, iteration: i + 1, exemplar, map })?;
+            if let Some(watch) = watch.as_mut() {
+                let sizes: Vec<_> = level.photos.iter().map(|p| (p.height(), p.width())).collect();
+                let map = named(centers(&f, plan.patch), &level.source.atlas, &sizes, (h, w))?;
+                watch(&Look { level: j, iteration: i + 1, photos: &level.photos, map })?;
             }
         }
         field = Some(f);
@@ -184,16 +227,16 @@ pub fn run(
     let votes = vote(ctx.simd, &field, &finest.source, plan.wrap);
     let canvas = seams::Canvas {
         source: &finest.source.image,
-        usable: mask.map(Mask::usable),
+        atlas: &finest.source.atlas,
+        usable: exemplar.usable.as_deref(),
         target: &without_apron(&votes, plan, plan.size),
         wrap: plan.wrap,
     };
     seams::settle(ctx, &canvas, &mut yx, SEAM_SWEEPS)?;
-    let map = SourceMap::new(plan.size, (photo.height(), photo.width()), yx)?;
-    if let (Some(watch), Some(exemplar)) = (watch, &finest.exemplar) {
-        let coarsest = levels.len() == 1;
-        let iteration = effort(plan, finest, coarsest).0 + 1;
-        watch(&Look { level: 0, iteration, exemplar, map: map.clone() })?;
+    let map = named(yx, &finest.source.atlas, &exemplar.sizes, plan.size)?;
+    if let Some(watch) = watch {
+        let iteration = effort(plan, finest, n_coarse == 0).0 + 1;
+        watch(&Look { level: 0, iteration, photos: &finest.photos, map: map.clone() })?;
     }
     Ok(map)
 }
@@ -204,17 +247,48 @@ fn centers(field: &Field, patch: usize) -> Vec<seams::From> {
     field.pos.iter().map(|p: &Pos| [(p.y() + half) as u32, (p.x() + half) as u32]).collect()
 }
 
-/// Peak memory of [`run`] besides the photo itself, for a photo and an output of these sizes
-/// (height, width), in bytes; generous by a quarter.
-pub fn memory_bytes(photo: (usize, usize), output: (usize, usize)) -> u64 {
-    // Per photo pixel: linear light of this level and the next (12 + 7), codes with and without
-    // contrast (8), sums of squares and norms of all levels (4 + 8 * 2.45 / 2).
-    const PHOTO: u64 = 44;
+/// The source map, of this `size`, of pixels of an atlas of photos of these sizes.
+fn named(
+    yx: Vec<seams::From>,
+    atlas: &Atlas,
+    photos: &[(usize, usize)],
+    size: (usize, usize),
+) -> Result<SourceMap> {
+    if atlas.is_plain() {
+        return SourceMap::new(size, photos[0], yx);
+    }
+    let named = yx.into_iter().map(|[y, x]| {
+        let at = (y as usize, x as usize);
+        let view = &atlas.views()[atlas.view_at(at.0, at.1).unwrap_or(0)];
+        let (y, x) = view.source(at);
+        let origin = Origin { photo: view.picture as u16, symmetry: view.symmetry };
+        ([y as u32, x as u32], origin)
+    });
+    let (yx, origins) = named.unzip();
+    SourceMap::of_views(size, photos.to_vec(), yx, origins)
+}
+
+/// Peak memory of the analysis and a [`run`] besides the photos themselves, for photos and an output
+/// of these sizes (height, width) in this many symmetries, in bytes; generous by a quarter. `None` if
+/// the photos do not fit into one atlas.
+pub fn memory_bytes(
+    photos: &[(usize, usize)],
+    symmetries: &[Symmetry],
+    output: (usize, usize),
+) -> Option<u64> {
+    // Per photo pixel: linear light of this level and the next (12 + 7).
+    const PHOTO: u64 = 19;
+    // Per atlas pixel: codes without contrast (4), codes of all levels (4 * 2.45), and with a mask or
+    // several views what is usable, flag by flag (1 + 2.45) and as a list (4 * 2.45).
+    const ATLAS: u64 = 27;
     // Per output pixel: two fields (8), votes (8), canvas (4), three source maps (24), or the costs'
     // colours (20).
     const OUTPUT: u64 = 48;
+    let atlas = Atlas::new(photos, symmetries)?;
     let pixels = |(h, w): (usize, usize)| h as u64 * w as u64;
-    (PHOTO * pixels(photo) + OUTPUT * pixels(output)) / 4 * 5
+    let photos: u64 = photos.iter().map(|&photo| pixels(photo)).sum();
+    let atlas = pixels((atlas.height(), atlas.width()));
+    Some((PHOTO * photos + ATLAS * atlas + OUTPUT * pixels(output)) / 4 * 5)
 }
 
 /// Picks what to do at a level: iterations, and how far to search.

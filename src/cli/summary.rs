@@ -1,0 +1,187 @@
+//! What `texforge tile` says when it is done: to people, to programs, and in the file itself.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use serde::{Serialize, Serializer};
+
+use crate::base::ctx::Ctx;
+use crate::base::params::Value as _;
+use crate::cli::output::Target;
+use crate::cli::show::duration;
+use crate::cli::small::{SCHEMA_VERSION, typed};
+use crate::verb::params::{Measure, Size, TileParams};
+use crate::verb::tile::{Costs, Report};
+
+/// A file that the run writes.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct Written {
+    pub(super) role: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    name: Option<String>,
+    pub(super) path: String,
+    pub(super) width: usize,
+    pub(super) height: usize,
+}
+
+/// The `--json` object.
+#[derive(Debug, Serialize)]
+pub(super) struct Summary {
+    schema_version: u32,
+    verb: &'static str,
+    version: &'static str,
+    seed: u64,
+    threads: usize,
+    params: BTreeMap<&'static str, serde_json::Value>,
+    photo: Written,
+    /// The further photos.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    also: Vec<Written>,
+    tile: Written,
+    costs: Costs,
+    seconds: Seconds,
+    /// All tiles, the first as well, if there are several.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    variants: Vec<Variant>,
+    files: Vec<Written>,
+    notes: Vec<String>,
+}
+
+/// One tile of several.
+#[derive(Debug, Serialize)]
+struct Variant {
+    seed: u64,
+    tile: Written,
+    costs: Costs,
+    #[serde(serialize_with = "in_order")]
+    seconds: Vec<(&'static str, f64)>,
+}
+
+#[derive(Debug, Serialize)]
+struct Seconds {
+    /// In the order of the work.
+    #[serde(serialize_with = "in_order")]
+    stages: Vec<(&'static str, f64)>,
+    total: f64,
+}
+
+/// Pairs as one JSON object that keeps their order.
+fn in_order<S: Serializer>(pairs: &[(&'static str, f64)], to: S) -> Result<S::Ok, S::Error> {
+    to.collect_map(pairs.iter().copied())
+}
+
+impl Written {
+    pub(super) fn new(
+        role: &'static str,
+        name: Option<&str>,
+        path: &Path,
+        width: usize,
+        height: usize,
+    ) -> Self {
+        let path = path.to_string_lossy().into_owned();
+        Self { role, name: name.map(str::to_owned), path, width, height }
+    }
+
+    /// What it is, for people.
+    pub(super) fn what(&self) -> String {
+        match &self.name {
+            Some(name) => format!("{name} map"),
+            None => self.role.replace('_', " "),
+        }
+    }
+}
+
+/// How the tile was made, for the file itself. Holds nothing that differs between equal runs.
+pub(super) fn record(report: &Report) -> String {
+    serde_json::json!({
+        "tool": "texforge",
+        "version": report.version,
+        "verb": TileParams::VERB,
+        "seed": report.seed,
+        "params": params(report),
+    })
+    .to_string()
+}
+
+fn params(report: &Report) -> BTreeMap<&'static str, serde_json::Value> {
+    let schema = TileParams::schema();
+    let value = |name: &str, text: &str| match schema.iter().find(|p| p.name == name) {
+        Some(param) => typed(param, text),
+        None => text.into(),
+    };
+    report.params.iter().map(|(name, text)| (*name, value(name, text))).collect()
+}
+
+/// All of a run; `tiles` holds each tile's place and report.
+pub(super) fn summary(
+    ctx: &Ctx,
+    photos: &[PathBuf],
+    tiles: &[(Target, Report)],
+    notes: Vec<String>,
+    files: Vec<Written>,
+    elapsed: Duration,
+) -> Summary {
+    let variant = |(target, report): &(Target, Report)| {
+        let place = target.file().unwrap_or(Path::new("-"));
+        let (width, height) = report.tile_size;
+        let tile = Written::new("tile", None, place, width, height);
+        Variant { seed: report.seed, tile, costs: report.costs, seconds: report.seconds.clone() }
+    };
+    let mut variants: Vec<Variant> = tiles.iter().map(variant).collect();
+    let report = &tiles[0].1;
+    let first = variant(&tiles[0]);
+    if variants.len() == 1 {
+        variants.clear();
+    }
+    let photo = |(path, &(width, height)): (&PathBuf, &(usize, usize))| {
+        Written::new("photo", None, path, width, height)
+    };
+    Summary {
+        schema_version: SCHEMA_VERSION,
+        verb: TileParams::VERB,
+        version: report.version,
+        seed: first.seed,
+        threads: ctx.threads(),
+        params: params(report),
+        photo: photo((&photos[0], &report.photo_size)),
+        also: photos[1..].iter().zip(&report.also_sizes).map(photo).collect(),
+        tile: first.tile,
+        costs: first.costs,
+        seconds: Seconds { stages: first.seconds, total: elapsed.as_secs_f64() },
+        variants,
+        files,
+        notes,
+    }
+}
+
+/// The line at the end of a tile.
+pub(super) fn line(
+    asked: &TileParams,
+    target: &Target,
+    report: &Report,
+    elapsed: Duration,
+) -> String {
+    let (w, h) = report.tile_size;
+    let (photo_w, photo_h) = report.photo_size;
+    let why = if asked.size == Size::Auto {
+        format!(" (default size for a {photo_w}x{photo_h} photo)")
+    } else {
+        String::new()
+    };
+    let place = match target {
+        Target::Stdout => "standard output".into(),
+        Target::File(path) => path.display().to_string(),
+    };
+    let Costs { texture, stationarity, stationarity_by_measure } = report.costs;
+    let texture = texture.map_or(String::new(), |cost| format!("texture cost {cost:.2}, "));
+    let measure = asked.measure;
+    let by_measure = stationarity_by_measure
+        .filter(|_| measure != Measure::Histogram)
+        .map_or(String::new(), |cost| format!(" (by {}: {cost:.3})", measure.show()));
+    format!(
+        "{place}  {w}x{h}{why}, seed {}, {}, {texture}stationarity cost {stationarity:.2}{by_measure}",
+        report.seed,
+        duration(elapsed),
+    )
+}
