@@ -49,7 +49,7 @@ def tile(
     sigma: float = 0.1,
     patch: int = 11,
     uniformity: float = 1.0,
-    rarity: float = 1.0,
+    rarity: float = 0.5,
     quality: Quality = "normal",
     avoid_grow: int = 0,
     flatten: float = 0.0,

@@ -144,7 +144,7 @@ params! {
         /// How strongly every part of the photo is made to contribute equally; 0 switches it off.
         uniformity: f32 = 1.0, in 0.0..=100.0;
         /// How strongly single things that catch the eye (a leaf, a nail, a dark spot) are held back; 0 treats them like the rest. For the method stationary.
-        rarity: f32 = 1.0, in 0.0..=4.0;
+        rarity: f32 = 0.5, in 0.0..=4.0;
         /// How much time to spend.
         quality: Quality = Quality::Normal;
         /// How far the marks of the avoid mask are grown: nothing this near to a mark is copied.

@@ -372,9 +372,9 @@ fn plan(
     let even = params.method == Method::Stationary;
     let wraps = params.method != Method::NoWrap;
     let (coarse_iterations, fine_iterations) = match params.quality {
-        Quality::Draft => (20, 1),
-        Quality::Normal => (60, 2),
-        Quality::Best => (120, 6),
+        Quality::Draft => (12, 1),
+        Quality::Normal => (30, 2),
+        Quality::Best => (60, 6),
     };
     stationary::Plan {
         size,

@@ -174,6 +174,8 @@ class Exemplar:
             **dict(variant.options),
         )
         params = made.params
+        stages = dict(made.report["seconds"])
+        seconds = sum(stages.values()) - stages["trace"] - stages["costs"]
         text = texture_cost(
             made,
             self.photo,
@@ -195,7 +197,7 @@ class Exemplar:
             "c_text_bound": made.costs.texture,
             "c_stat": made.costs.stationarity,
             "total": text.mean + made.costs.stationarity,
-            "seconds": round(dict(made.report["seconds"])["synthesis"], 3),
+            "seconds": round(seconds, 3),
             "iterations": len(made.trace),
             "photo_height": self.photo.shape[0],
             "photo_width": self.photo.shape[1],
