@@ -118,8 +118,8 @@ def tile(
         with it, up to eight photos'.
     band : int
         Width of the border that is made anew, in pixels, so that the photo repeats; its middle
-        stays as it is, pixel for pixel. At least `patch`; 0 makes all anew. The tile then is as
-        large as the photo, unless `size` cuts out its middle.
+        stays as it is, pixel for pixel. At least `patch`, at most 8192; 0 makes all anew. The tile
+        then is as large as the photo, unless `size` cuts out its middle.
     seed : int
         Seed of all random choices, 0 to 2**64 - 1.
     also : sequence of array_like or Pillow images, optional

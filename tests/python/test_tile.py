@@ -267,3 +267,23 @@ def test_a_tile_cannot_be_changed_by_mistake(photo: Photo) -> None:
     with pytest.raises(AttributeError):
         tile.seed = 3  # type: ignore[misc]
     assert "24 x 32 uint8" in repr(tile)
+
+
+def test_a_band_keeps_the_middle() -> None:
+    photo = np.random.default_rng(4).integers(0, 65536, (48, 64, 3), dtype=np.uint16)
+    tile = texforge.tile(photo, band=9, patch=5, quality="draft")
+    assert tile.image.shape == photo.shape
+    assert np.array_equal(tile.image[9:-9, 9:-9], photo[9:-9, 9:-9])
+    assert not np.array_equal(tile.image, photo)
+    assert not np.array_equal(
+        texforge.tile(photo, size=(48, 64), patch=5, quality="draft").image[9:-9, 9:-9],
+        photo[9:-9, 9:-9],
+    )
+
+
+def test_rarity_changes_what_is_copied() -> None:
+    photo = np.full((64, 64), 120, dtype=np.uint8)
+    photo += np.random.default_rng(5).integers(0, 40, photo.shape, dtype=np.uint8)
+    photo[20:32, 20:32] = np.arange(12, dtype=np.uint8) * 6 + 90
+    tiles = [texforge.tile(photo, size=48, patch=7, rarity=rarity).image for rarity in (0, 4)]
+    assert not np.array_equal(*tiles)
