@@ -256,18 +256,22 @@ fn level(
     let usable_pixel = |i: &usize| usable.is_none_or(|u| u[*i]);
     // An odd step visits every column of a picture of even width.
     let step = (eh * ew / 400_000) | 1;
-    let count = |mut counts: Counts, sample: usize| {
-        let i = sample * step;
-        if usable_pixel(&i) {
-            let px = source.image.pixel(i / ew, i % ew);
-            counts.iter_mut().zip(px).for_each(|(counts, code)| counts[code as usize] += 1);
+    const CHUNK: usize = 1 << 14;
+    let n_samples = (eh * ew).div_ceil(step);
+    let count = |chunk: usize| {
+        let mut counts = NOTHING;
+        for sample in chunk * CHUNK..((chunk + 1) * CHUNK).min(n_samples) {
+            let i = sample * step;
+            if usable_pixel(&i) {
+                let px = source.image.pixel(i / ew, i % ew);
+                counts.iter_mut().zip(px).for_each(|(counts, code)| counts[code as usize] += 1);
+            }
         }
         counts
     };
-    let masses = (0..(eh * ew).div_ceil(step))
+    let masses = (0..n_samples.div_ceil(CHUNK))
         .into_par_iter()
-        .with_min_len(1 << 14)
-        .fold(|| NOTHING, count)
+        .map(count)
         .reduce(
             || NOTHING,
             |mut a, b| {
