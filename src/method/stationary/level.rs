@@ -94,6 +94,8 @@ impl Codes {
 /// How many pixels have each code, per channel.
 type Counts = [[u32; CODE_MAX as usize + 1]; 4];
 const NOTHING: Counts = [[0; CODE_MAX as usize + 1]; 4];
+/// How many samples are counted at a time: the counts of a chunk are too large to be moved per sample.
+const CHUNK: usize = 1 << 14;
 
 /// One level of the pyramid.
 #[derive(Debug)]
@@ -256,7 +258,6 @@ fn level(
     let usable_pixel = |i: &usize| usable.is_none_or(|u| u[*i]);
     // An odd step visits every column of a picture of even width.
     let step = (eh * ew / 400_000) | 1;
-    const CHUNK: usize = 1 << 14;
     let n_samples = (eh * ew).div_ceil(step);
     let count = |chunk: usize| {
         let mut counts = NOTHING;
