@@ -34,6 +34,7 @@ pub use image::sigma_map::SigmaMap;
 pub use image::sourcemap::{Origin, SourceMap};
 pub use image::symmetry::Symmetry;
 pub use verb::inputs::Inputs;
+pub use verb::palette::{Palette, palette};
 pub use verb::params::{Axis, Measure, Method, Quality, Size, Symmetries, TileParams};
 pub use verb::texture_cost::{TextureCost, TextureCostParams, texture_cost};
 pub use verb::tile::{Costs, Report, Step, Tile, tile, tiles};

@@ -2,7 +2,8 @@
 
 `tile` makes a texture that repeats from a casual photo; the `Tile` it returns holds the picture
 and says which pixel of the photo each of its pixels is, so that other maps of the same material
-can follow (`apply`). `texture_cost` measures how much a texture looks like its photo.
+can follow (`apply`). `palette` shows how even it can become. `texture_cost`
+measures how much a texture looks like its photo.
 `read_image` and `write_image` keep all the bits that files have. `study` compares the ways to
 tile over many photos.
 Everything raised on purpose is a `TexforgeError`.
@@ -32,6 +33,7 @@ from texforge._errors import (
     TexforgeError,
 )
 from texforge._measure import texture_cost
+from texforge._palette import Palette, palette
 from texforge._study import Study, study
 from texforge._texforge import __version__
 from texforge._types import (
@@ -72,6 +74,7 @@ __all__ = [
     "MissingFileError",
     "OutOfMemory",
     "OutputExistsError",
+    "Palette",
     "ParameterError",
     "PathType",
     "PictureError",
@@ -91,6 +94,7 @@ __all__ = [
     "__version__",
     "apply",
     "load_source_map",
+    "palette",
     "read_image",
     "study",
     "texture_cost",

@@ -47,6 +47,7 @@ def tile(
     measure: Measure = "histogram",
     order: int = 2,
     sigma: float = 0.1,
+    stationarity: float | None = None,
     patch: int = 11,
     uniformity: float = 1.0,
     rarity: float = 0.5,
@@ -94,6 +95,11 @@ def tile(
     sigma : float
         Reach of the measure, as a fraction of the tile's shorter side, 0.01 to 1. Smaller evens
         out smaller stains, larger keeps more variety.
+    stationarity : float, optional
+        How even the tile becomes, in place of `sigma`, 0 to 1: equal steps look like equal steps,
+        whatever the photo (Sec. 4.4 of the paper). 0 evens out least, 1 until little but one
+        material is left. What sigma that is, is found by trying, which takes about a second;
+        ``tile.params["sigma"]`` says it. `palette` shows the range.
     patch : int
         Side of the patches that are compared, in pixels; odd, 3 to 21. Larger keeps larger
         features whole, smaller mixes more.
@@ -197,7 +203,7 @@ def tile(
     True
     """
     arguments = locals()
-    (made,) = _tiles(1, **arguments)
+    (made,), _ = tiles(1, as_palette=False, **arguments)
     return made
 
 
@@ -237,12 +243,15 @@ def tile_variants(image: ImageLike, count: int, **options: Unpack[TileOptions]) 
     """
     arguments = inspect.signature(tile).bind(image, **options)
     arguments.apply_defaults()
-    return _tiles(_arrays.integer("count", count, 1, 1000), **arguments.arguments)
+    count = _arrays.integer("count", count, 1, 1000)
+    made, _ = tiles(count, as_palette=False, **arguments.arguments)
+    return made
 
 
-def _tiles(
+def tiles(
     count: int,
     *,
+    as_palette: bool,
     image: ImageLike,
     seed: int,
     also: Sequence[ImageLike] | None,
@@ -255,7 +264,8 @@ def _tiles(
     progress: Progress,
     trace: bool,
     **params: Any,
-) -> list[Tile]:
+) -> tuple[list[Tile], Any]:
+    """Make tiles of neighbouring seeds, or those of a palette and what else it is."""
     photo = _arrays.picture(image, "the photo", encoding)
     further = [
         _arrays.picture(other, f"photo {i}", encoding) for i, other in enumerate(also or (), 2)
@@ -273,7 +283,7 @@ def _tiles(
     others = {name: _maps(other, name, len(further)) for name, other in (maps or {}).items()}
     kinds = {name: _texforge.map_kind(name) for name in others}
     with reporting(progress) as callback:
-        made = _texforge.tiles(
+        made, rest = _texforge.tiles(
             photo=photo.packed(),
             also=[other.packed() for other in further],
             mask=None if mask is None else _arrays.mask(mask).packed(),
@@ -288,11 +298,12 @@ def _tiles(
             params=texts,
             seed=_arrays.integer("seed", seed),
             count=count,
+            as_palette=as_palette,
             threads=_arrays.integer("threads", threads or 0, high=1024),
             progress=callback,
             trace=bool(trace),
         )
-    return [_tile(photo, others, parts) for parts in made]
+    return [_tile(photo, others, parts) for parts in made], rest
 
 
 def _tile(photo: _arrays.Picture, others: dict[str, list[_arrays.Picture]], parts: Any) -> Tile:
@@ -534,6 +545,11 @@ def preview_png(tile: Tile) -> bytes | None:
         height, width, channels = image.shape[0] // step, image.shape[1] // step, image.shape[2]
         blocks = image[: height * step, : width * step].reshape(height, step, width, step, channels)
         image = blocks.mean(axis=(1, 3)).round().astype(np.uint8)
+    return png(image)
+
+
+def png(image: npt.NDArray[Any]) -> bytes:
+    """Return a picture to look at as a PNG."""
     return bytes(_texforge.encode_png(picture=_arrays.picture(image, "the preview").packed()))
 
 
@@ -597,6 +613,8 @@ def _text(name: str, kind: str, value: Any) -> str:
         return _size_text(value)
     if kind == "integer":
         return str(_arrays.integer(name, value))
+    if kind == "optional number":
+        return "none" if value is None else _number(name, value)
     return _number(name, value) if kind == "number" else _arrays.word(name, value)
 
 
@@ -622,6 +640,8 @@ def _typed(params: dict[str, str]) -> dict[str, Any]:
             typed[name] = int(text)
         elif param["kind"] == "number":
             typed[name] = float(text)
+        elif param["kind"] == "optional number":
+            typed[name] = None if text == "none" else float(text)
         else:
             typed[name] = text
     return typed

@@ -9,6 +9,7 @@ _Step = tuple[int, int, float | None, float]
 _Size = tuple[int, int]
 _Map = tuple[Any, _Size, list[_Size], Any]
 _MapOut = tuple[bytearray, _Size, list[_Size], bytearray | None]
+_Palette = tuple[list[float], list[tuple[float, float]], _PictureOut]
 _TileOut = tuple[_PictureOut, _MapOut | None, list[tuple[str, _PictureOut]], str, list[_Step]]
 
 __all__ = [
@@ -42,10 +43,11 @@ def tiles(
     params: list[tuple[str, str]],
     seed: int,
     count: int,
+    as_palette: bool,
     threads: int,
     progress: Callable[[float], object] | None,
     trace: bool,
-) -> list[_TileOut]: ...
+) -> tuple[list[_TileOut], _Palette | None]: ...
 def texture_cost(
     *,
     texture: _Picture,

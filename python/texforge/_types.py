@@ -82,7 +82,7 @@ Progress: TypeAlias = bool | Callable[[float], object] | ProgressBar | None
 
 
 class TileOptions(TypedDict, total=False):
-    """The options of `texforge.tile`, for `texforge.tile_variants`."""
+    """The options of `texforge.tile`, for `texforge.tile_variants` and `texforge.palette`."""
 
     size: int | tuple[int, int] | None
     axis: Axis
@@ -90,6 +90,7 @@ class TileOptions(TypedDict, total=False):
     measure: Measure
     order: int
     sigma: float
+    stationarity: float | None
     patch: int
     uniformity: float
     rarity: float
@@ -280,7 +281,8 @@ class Tile:
     seed : int
         Seed of all random choices.
     params : dict
-        Every parameter that `texforge.tile` used, with `size` as (height, width).
+        Every parameter that `texforge.tile` used, with `size` as (height, width), and the sigma
+        that `stationarity` came to in its place: ``tile(photo, **params)`` makes the same again.
     report : dict
         How the tile was made, as ``texforge tile --json`` reports it: version, seconds, notes
         and so on. Sizes in it are (width, height).

@@ -34,6 +34,23 @@ macro_rules! number {
 }
 number!(usize: "integer", u64: "integer", f32: "number");
 
+/// A value that may be left out: `none`.
+impl Value for Option<f32> {
+    const KIND: &'static str = "optional number";
+
+    fn parse(text: &str) -> Option<Self> {
+        if text == "none" { Some(None) } else { f32::parse(text).map(Some) }
+    }
+
+    fn show(&self) -> String {
+        self.as_ref().map_or_else(|| "none".into(), f32::show)
+    }
+
+    fn expected() -> String {
+        "a number, or none".into()
+    }
+}
+
 /// One parameter as the faces see it.
 #[derive(Debug, Clone)]
 pub struct Param {

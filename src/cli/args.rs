@@ -7,7 +7,8 @@ use clap::{Arg, ArgAction, ArgMatches, Command, ValueHint, value_parser};
 
 use crate::base::error::Result;
 use crate::base::params::{Param, Value as _};
-use crate::cli::{maps, study};
+use crate::cli::sources::Sources;
+use crate::cli::{maps, palette, study};
 use crate::image::material::MapKind;
 use crate::verb::params::TileParams;
 use crate::verb::tile::MAX_VARIANTS;
@@ -19,6 +20,7 @@ Examples:
   texforge tile brick.jpg -o trim.png --axis x --quality best
   texforge tile scan.png -o wall.png --mask usable.png --map normal=scan_nrm.png
   texforge tile brick.jpg -o clean.png --avoid stains.png --avoid-grow 12
+  texforge tile wall.jpg -o wall.png --stationarity 0.7
   texforge tile meadow.jpg -o meadow.png --flatten 0.2 --variants 4
   texforge tile grass_a.jpg --also grass_b.jpg --symmetry all -o grass.png
   texforge tile brick.jpg -o - | display";
@@ -46,6 +48,7 @@ pub(super) fn command() -> Command {
         .subcommand_required(true)
         .arg_required_else_help(true)
         .subcommand(tile())
+        .subcommand(palette::command())
         .subcommand(apply())
         .subcommand(study::command())
         .subcommand(
@@ -84,7 +87,7 @@ pub(super) fn command() -> Command {
                 .arg(
                     Arg::new("verb")
                         .value_name("COMMAND")
-                        .value_parser(["tile", "apply", "study", "params", "info", "completions"])
+                        .value_parser(["tile", "palette", "apply", "study", "params", "info", "completions"])
                         .help("The page of this command"),
                 ),
         )
@@ -94,7 +97,7 @@ fn tile() -> Command {
     Command::new(TileParams::VERB)
         .about("Turns a photo into a stationary tile: no seam, and no blob that gives the repetition away.")
         .before_help(TILE_EXAMPLES)
-        .arg(file("photo", "PHOTO", "The photo: PNG, JPEG, TIFF, WebP, EXR and others").required(true))
+        .arg(Sources::photo())
         .arg(
             file("output", "TILE", "The tile to write; the extension chooses the format. `-`: PNG to standard output")
                 .short('o')
@@ -103,22 +106,7 @@ fn tile() -> Command {
         )
         .args(TileParams::schema().into_iter().map(flag))
         .next_help_heading("Inputs")
-        .arg(
-            file("also", "PHOTO", "A further photo to mix with the first, of the same sample type and channels and of \
-                 any size; may be repeated")
-                .long("also")
-                .action(ArgAction::Append),
-        )
-        .arg(
-            file("mask", "FILE", "Picture of the photo's size: usable is where its first channel is at least half of \
-                 full scale and its alpha, if any, too; the photo's own transparent pixels are never used")
-                .long("mask"),
-        )
-        .arg(
-            file("avoid", "FILE", "Picture of the photo's size whose marks are never copied: where its first channel is \
-                 at least half of full scale and its alpha, if any, too; --avoid-grow widens the marks")
-                .long("avoid"),
-        )
+        .args(Sources::args())
         .arg(
             file("sigma-map", "FILE", "Grey picture of the tile's size that says sigma at every pixel, in place of \
                  --sigma: floats are sigma itself, of integers black is 0.01, mid grey 0.1 and white 1, in even factors")
@@ -160,24 +148,27 @@ fn tile() -> Command {
         .arg(json())
         .arg(switch("quiet", "Say nothing but errors").short('q'))
         .next_help_heading("Running")
-        .arg(
-            Arg::new("seed")
-                .long("seed")
-                .value_name("N")
-                .default_value("0")
-                .value_parser(value_parser!(u64))
-                .allow_negative_numbers(true)
-                .help("Seed of all random choices; the same seed gives the same pixels on any machine"),
-        )
-        .arg(
-            Arg::new("threads")
-                .long("threads")
-                .value_name("N")
-                .default_value("0")
-                .value_parser(value_parser!(usize))
-                .allow_negative_numbers(true)
-                .help("Worker threads, 0 for one per core; changes the speed, never the result"),
-        )
+        .args(running())
+}
+
+/// What any command that makes tiles can be told about its run.
+pub(super) fn running() -> [Arg; 2] {
+    [
+        Arg::new("seed")
+            .long("seed")
+            .value_name("N")
+            .default_value("0")
+            .value_parser(value_parser!(u64))
+            .allow_negative_numbers(true)
+            .help("Seed of all random choices; the same seed gives the same pixels on any machine"),
+        Arg::new("threads")
+            .long("threads")
+            .value_name("N")
+            .default_value("0")
+            .value_parser(value_parser!(usize))
+            .allow_negative_numbers(true)
+            .help("Worker threads, 0 for one per core; changes the speed, never the result"),
+    ]
 }
 
 fn apply() -> Command {
@@ -213,7 +204,7 @@ fn apply() -> Command {
 }
 
 /// The flag of one parameter.
-fn flag(param: Param) -> Arg {
+pub(super) fn flag(param: Param) -> Arg {
     let mut facts = Vec::new();
     if !param.range.is_empty() {
         facts.push(param.range);
@@ -250,7 +241,8 @@ fn flag(param: Param) -> Arg {
 pub(super) fn tile_params(matches: &ArgMatches) -> Result<TileParams> {
     let mut params = TileParams::default();
     for param in TileParams::schema() {
-        if let Some(text) = matches.get_one::<String>(param.name) {
+        // A command may leave out some.
+        if let Ok(Some(text)) = matches.try_get_one::<String>(param.name) {
             params.set(param.name, text)?;
         }
     }

@@ -9,9 +9,10 @@ mod exit;
 mod files;
 mod maps;
 mod output;
-mod preview;
+mod palette;
 mod show;
 mod small;
+mod sources;
 pub mod study;
 mod summary;
 mod tile;
@@ -38,6 +39,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
     };
     let result = match command {
         "tile" => tile::run(matches),
+        "palette" => palette::run(matches),
         "apply" => apply::run(matches),
         "params" => small::params(matches),
         "info" => small::info(matches),

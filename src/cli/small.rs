@@ -55,7 +55,10 @@ pub(super) fn params(matches: &ArgMatches) -> Result<()> {
 /// A parameter's text as the JSON type that it has.
 pub(super) fn typed(param: &Param, text: &str) -> serde_json::Value {
     match param.kind {
-        "integer" | "number" => serde_json::from_str(text).unwrap_or_else(|_| text.into()),
+        "optional number" if text == "none" => serde_json::Value::Null,
+        "integer" | "number" | "optional number" => {
+            serde_json::from_str(text).unwrap_or_else(|_| text.into())
+        }
         _ => text.into(),
     }
 }

@@ -34,6 +34,9 @@ pub(super) struct Summary {
     seed: u64,
     threads: usize,
     params: BTreeMap<&'static str, serde_json::Value>,
+    /// The place on the dial that chose the sigma.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    stationarity: Option<f32>,
     photo: Written,
     /// The further photos.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -144,6 +147,7 @@ pub(super) fn summary(
         seed: first.seed,
         threads: ctx.threads(),
         params: params(report),
+        stationarity: report.stationarity,
         photo: photo((&photos[0], &report.photo_size)),
         also: photos[1..].iter().zip(&report.also_sizes).map(photo).collect(),
         tile: first.tile,
@@ -179,8 +183,11 @@ pub(super) fn line(
     let by_measure = stationarity_by_measure
         .filter(|_| measure != Measure::Histogram)
         .map_or(String::new(), |cost| format!(" (by {}: {cost:.3})", measure.show()));
+    let dial = report.stationarity.map_or(String::new(), |place| {
+        format!("stationarity {place} is a sigma of {}, ", report.sigma)
+    });
     format!(
-        "{place}  {w}x{h}{why}, seed {}, {}, {texture}stationarity cost {stationarity:.2}{by_measure}",
+        "{place}  {w}x{h}{why}, seed {}, {}, {dial}{texture}stationarity cost {stationarity:.2}{by_measure}",
         report.seed,
         duration(elapsed),
     )

@@ -10,28 +10,27 @@ use crate::base::error::{Error, Result};
 use crate::cli::maps::{self, Wanted};
 use crate::cli::output::{Target, to_stdout};
 use crate::cli::small::print_json;
+use crate::cli::sources::Sources;
 use crate::cli::summary::{self, Summary, Written};
 use crate::cli::work::{Session, supervise, watch_signals};
-use crate::cli::{args, files, preview};
-use crate::image::mask::Mask;
+use crate::cli::{args, files};
 use crate::image::material::{MapKind, Sibling};
 use crate::image::picture::Picture;
-use crate::image::sigma_map::SigmaMap;
+use crate::image::sheet;
 use crate::verb::inputs::Inputs;
 use crate::verb::params::{Method, TileParams};
 use crate::verb::tile::{Tile, tiles};
 
+/// Longest side of a preview in pixels; what a screen shows at once.
+const PREVIEW_SIDE: usize = 2048;
+
 /// What was typed, checked as far as it can be without looking at a file.
 #[derive(Debug)]
 struct Request {
-    /// The photo and those mixed with it.
-    photos: Vec<PathBuf>,
+    sources: Sources,
     /// Where each tile goes.
     places: Vec<Place>,
     params: TileParams,
-    mask: Option<PathBuf>,
-    avoid: Option<PathBuf>,
-    sigma_map: Option<PathBuf>,
     maps: Vec<Wanted>,
     pick_up: bool,
     force: bool,
@@ -74,10 +73,9 @@ impl Request {
         let path = |id| matches.get_one::<PathBuf>(id).cloned();
         let params = args::tile_params(matches)?;
         let target = Target::typed(&path("output").unwrap_or_default())?;
-        let mut photos = vec![path("photo").unwrap_or_default()];
-        photos.extend(matches.get_many::<PathBuf>("also").into_iter().flatten().cloned());
+        let sources = Sources::typed(matches);
         let maps = matches.get_many::<OsString>("map").into_iter().flatten();
-        let maps = maps::typed(maps, photos.len())?;
+        let maps = maps::typed(maps, sources.photos.len())?;
         let source_map = path("save-source-map");
         let wants = |flag| matches.get_flag(flag);
         let count = matches.get_one::<usize>("variants").copied().unwrap_or(1);
@@ -99,28 +97,20 @@ impl Request {
             return Err(Error::parameter("method", expected, "`make-seamless`, which blends"));
         }
         Ok(Self {
-            photos,
+            sources,
             pick_up: !wants("no-maps")
                 && target != Target::Stdout
                 && params.method != Method::MakeSeamless,
             places: places(&target, source_map.as_deref(), wants("preview"), count),
             params,
-            mask: path("mask"),
-            avoid: path("avoid"),
-            sigma_map: path("sigma-map"),
             maps,
             force: wants("force"),
         })
     }
 
     fn inputs(&self) -> Vec<&Path> {
-        let maps = self.maps.iter().flat_map(|m| &m.paths);
-        maps.chain(&self.photos)
-            .chain(&self.mask)
-            .chain(&self.avoid)
-            .chain(&self.sigma_map)
-            .map(PathBuf::as_path)
-            .collect()
+        let maps = self.maps.iter().flat_map(|m| &m.paths).map(PathBuf::as_path);
+        maps.chain(self.sources.paths()).collect()
     }
 
     /// Fails if an output cannot be written, or two outputs are the same file.
@@ -177,40 +167,12 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Vec
     // Look at the places before anything is read: the cheapest refusal first.
     request.check_outputs(&[])?;
 
-    // Read all inputs and let them prove that they fit together.
-    let mut photo = files::read(&request.photos[0], MapKind::Color)?;
-    let mut also = Vec::new();
-    let mut notes = std::mem::take(&mut photo.meta.notes);
-    for path in &request.photos[1..] {
-        session.check()?;
-        let mut picture = files::read(path, MapKind::Color)?;
-        let shown = path.display();
-        notes.extend(picture.meta.notes.drain(..).map(|note| format!("{shown}: {note}")));
-        also.push(picture);
-    }
-    session.check()?;
-    let read_mask = |path: &Option<PathBuf>, what| {
-        let Some(path) = path else { return Ok(None) };
-        let mask = Mask::from_picture(&files::read(path, MapKind::Color)?)?;
-        mask.ensure_size(what, photo.height(), photo.width())?;
-        Ok(Some(mask))
-    };
-    let mask = read_mask(&request.mask, "the mask")?;
-    let avoid = read_mask(&request.avoid, "the avoid mask")?;
-    let sigma_map = match &request.sigma_map {
-        None => None,
-        Some(path) => Some(SigmaMap::from_picture(&files::read(path, MapKind::Data)?)?),
-    };
-    let inputs = Inputs {
-        also: &also,
-        mask: mask.as_ref(),
-        avoid: avoid.as_ref(),
-        sigma_map: sigma_map.as_ref(),
-        ..Inputs::new(&photo)
-    };
+    let mut pictures = request.sources.read(session)?;
+    let mut notes = std::mem::take(&mut pictures.notes);
+    let (photo, inputs) = (&pictures.photo, pictures.inputs());
     let maps = read_maps(session, request, &inputs, &mut notes)?;
     request.check_outputs(&maps)?;
-    files::ensure_can_hold(&photo, request.places[0].tile.file(), MapKind::Color)?;
+    files::ensure_can_hold(photo, request.places[0].tile.file(), MapKind::Color)?;
     session.check()?;
 
     // The long work.
@@ -251,7 +213,7 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Vec
             }
         }
         if let Some(path) = &place.preview {
-            let tiling = preview::tiling(&picture)?;
+            let tiling = sheet::repeated(&picture, 3, PREVIEW_SIDE)?;
             let bytes = files::encode(&tiling, Some(path), MapKind::Color, None)?;
             stage("preview", None, path, bytes, &tiling)?;
         }
@@ -273,7 +235,7 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Vec
     let elapsed = session.console.elapsed();
     let line = |(target, report): &_| summary::line(&request.params, target, report, elapsed);
     let lines = done.iter().map(line).collect();
-    Ok((summary::summary(ctx, &request.photos, &done, notes, written, elapsed), lines))
+    Ok((summary::summary(ctx, &request.sources.photos, &done, notes, written, elapsed), lines))
 }
 
 /// Reads the maps that were typed and those that lie beside the photos. Of the latter, those that
@@ -335,7 +297,7 @@ fn read_maps(
 fn beside(request: &Request, notes: &mut Vec<String>) -> Result<Vec<Wanted>> {
     let taken: Vec<_> = request.inputs().into_iter().map(Path::to_owned).collect();
     let mut found: Vec<Vec<Sibling>> = Vec::new();
-    for photo in &request.photos {
+    for photo in &request.sources.photos {
         let mut siblings = files::siblings(photo)?;
         siblings.retain(|s| {
             let typed = request.maps.iter().any(|m| m.name == s.name);

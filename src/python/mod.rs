@@ -46,13 +46,16 @@ type StepOut = (usize, u32, Option<f64>, f64);
 type TileOut<'py> =
     (ArrayOut<'py>, Option<MapOut<'py>>, Vec<(String, ArrayOut<'py>)>, String, Vec<StepOut>);
 
-/// Makes `count` tiles.
+/// What a palette is besides its tiles: the differences, the curve and the picture of all.
+type PaletteOut<'py> = (Vec<f64>, Vec<(f64, f64)>, ArrayOut<'py>);
+
+/// Makes `count` tiles, of neighbouring seeds or as the steps of a palette.
 #[pyfunction]
 #[expect(
     clippy::too_many_arguments,
     reason = "one private caller, in _api.py, passes them by name"
 )]
-#[pyo3(signature = (*, photo, also, mask, avoid, sigma_map, maps, params, seed, count, threads, progress, trace))]
+#[pyo3(signature = (*, photo, also, mask, avoid, sigma_map, maps, params, seed, count, as_palette, threads, progress, trace))]
 fn tiles<'py>(
     py: Python<'py>,
     photo: ArrayIn<'py>,
@@ -64,10 +67,11 @@ fn tiles<'py>(
     params: Vec<(String, String)>,
     seed: u64,
     count: usize,
+    as_palette: bool,
     threads: usize,
     progress: Option<Bound<'py, PyAny>>,
     trace: bool,
-) -> PyResult<Vec<TileOut<'py>>> {
+) -> PyResult<(Vec<TileOut<'py>>, Option<PaletteOut<'py>>)> {
     let mut settings = TileParams::default();
     for (name, text) in &params {
         settings.set(name, text).into_py(py)?;
@@ -93,7 +97,7 @@ fn tiles<'py>(
     }
     let ctx = Ctx::new(seed, threads).into_py(py)?;
     let job = ctx.job();
-    let made = enter::enter(py, &job, progress.as_ref(), move || {
+    let (made, palette) = enter::enter(py, &job, progress.as_ref(), move || {
         let inputs = Inputs {
             also: &also,
             mask: mask.as_ref(),
@@ -113,8 +117,14 @@ fn tiles<'py>(
             let gathered = gathered.collect::<Result<Vec<_>>>()?;
             Ok((tile, gathered))
         };
-        let tiles = crate::verb::tile::tiles(&ctx, &inputs, &settings, count)?;
-        tiles.into_iter().map(gather).collect::<Result<Vec<_>>>()
+        let (tiles, rest) = if as_palette {
+            let palette = crate::verb::palette::palette(&ctx, &inputs, &settings, count)?;
+            let picture = palette.picture()?;
+            (palette.tiles, Some((palette.differences, palette.curve, picture)))
+        } else {
+            (crate::verb::tile::tiles(&ctx, &inputs, &settings, count)?, None)
+        };
+        Ok((tiles.into_iter().map(gather).collect::<Result<Vec<_>>>()?, rest))
     })?;
     let out = |(tile, gathered): (Tile, Vec<(String, Picture)>)| {
         let report = serde_json::to_string(&tile.report)
@@ -129,7 +139,13 @@ fn tiles<'py>(
         let trace = tile.trace.iter().map(step).collect();
         Ok((array_out(py, &tile.picture)?, source_map, maps, report, trace))
     };
-    made.into_iter().map(out).collect()
+    let tiles = made.into_iter().map(out).collect::<PyResult<_>>()?;
+    let palette = palette
+        .map(|(differences, curve, picture)| {
+            PyResult::Ok((differences, curve, array_out(py, &picture)?))
+        })
+        .transpose()?;
+    Ok((tiles, palette))
 }
 
 fn mask_of(py: Python<'_>, mask: &ArrayIn<'_>) -> PyResult<Mask> {

@@ -1,6 +1,8 @@
 //! Room 7: the public functions, one file each. They pick methods, combine them and report.
 
 pub mod inputs;
+mod maker;
+pub mod palette;
 pub mod params;
 pub mod texture_cost;
 pub mod tile;

@@ -139,6 +139,8 @@ params! {
         order: usize = 2, in 1..=4;
         /// Reach of the stationarity measure: smaller evens out smaller stains, larger keeps more variety.
         sigma: f32 = 0.1, in 0.01..=1.0, unit "fraction of the tile's shorter side";
+        /// How even the tile becomes, in place of sigma, 0 to 1: equal steps look like equal steps, whatever the photo. 0 evens out least, 1 until little but one material is left; what sigma that is, is found by trying and takes about a second.
+        stationarity: Option<f32> = None;
         /// Side of the patches that are compared; odd. Larger keeps larger features whole, smaller mixes more.
         patch: usize = 11, in 3..=21, unit "px";
         /// How strongly every part of the photo is made to contribute equally; 0 switches it off.

@@ -387,3 +387,100 @@ mod flattening {
         folder.refuses(&quick(&["--force", "--flatten", "nan"]), 2, "`flatten`");
     }
 }
+
+mod the_dial {
+    use super::*;
+    use texforge::palette;
+
+    /// Noise with a dark stain in the middle.
+    fn stained() -> Picture {
+        let (mut photo, noise) = (Vec::new(), grain(96, 96, 4).picture());
+        let Samples::U8(noise) = noise.samples() else { panic!("8 bits") };
+        let channels = noise.len() / (96 * 96);
+        for (i, &v) in noise.iter().enumerate() {
+            let (y, x) = (i / channels / 96, i / channels % 96);
+            let dark = (30..60).contains(&y) && (20..55).contains(&x);
+            photo.push(if dark { v / 3 } else { v });
+        }
+        Picture::new(96, 96, channels, Samples::U8(photo), Encoding::Srgb).expect("photo")
+    }
+
+    #[test]
+    fn a_place_on_the_dial_is_a_step_of_the_palette_at_any_thread_count() {
+        let photo = stained();
+        let inputs = Inputs::new(&photo);
+        let params = draft(48, 40);
+        let steps = palette(&ctx(), &inputs, &params, 3).expect("a palette");
+        let sigmas: Vec<f32> = steps.tiles.iter().map(|tile| tile.report.sigma).collect();
+        assert_eq!((sigmas[0], sigmas[2]), (0.5, 0.02));
+        assert!(sigmas[1] < 0.5 && sigmas[1] > 0.02, "{sigmas:?}");
+        for threads in [1, 2, 5] {
+            let ctx = Ctx::new(0, threads).expect("pool");
+            let params = TileParams { stationarity: Some(0.5), ..params.clone() };
+            let tile = tiles(&ctx, &inputs, &params, 1).expect("a tile").remove(0);
+            assert!(tile.picture.samples() == steps.tiles[1].picture.samples(), "{threads}");
+            assert_eq!(tile.report.stationarity, Some(0.5));
+        }
+        let sheet = steps.picture().expect("a sheet");
+        assert!(sheet.width() > 3 * 2 * 48 && sheet.height() > 2 * 40);
+    }
+
+    #[test]
+    fn it_depends_on_the_photo() {
+        let sigma = |photo: &Picture| {
+            let params = TileParams { stationarity: Some(0.5), ..draft(48, 48) };
+            made(&Inputs::new(photo), &params).report.sigma
+        };
+        let (stained, clean) = (sigma(&stained()), sigma(&grain(96, 96, 4).picture()));
+        assert!((stained - clean).abs() > 0.001, "{stained} and {clean}");
+    }
+
+    #[test]
+    fn the_command_writes_every_step_and_all_in_one() {
+        let folder = Folder::with_photo();
+        let command = ["palette", "photo.png", "-o", "wall.png", "--size", "48"];
+        let command = [&command[..], &["--steps", "2", "--quality", "draft"]].concat();
+        let said = folder.does(&command);
+        assert!(said.contains("stationarity 0.00, sigma 0.5"), "{said}");
+        assert!(said.contains("stationarity 1.00, sigma 0.02"), "{said}");
+        let names = ["photo.png", "wall-1.png", "wall-2.png", "wall.palette.png"];
+        assert_eq!(folder.names(), names);
+        // The second is what its place on the dial makes.
+        let tile = ["--stationarity", "1", "--size", "48", "--quality", "draft"];
+        folder.does(&[&["tile", "photo.png", "-o", "again.png"][..], &tile].concat());
+        assert_eq!(folder.png("again.png").samples, folder.png("wall-2.png").samples);
+        // Nothing is overwritten, and a refusal leaves nothing.
+        let again = folder.run(&command);
+        assert_eq!(again.status.code(), Some(1));
+        let json = folder.run([&command[..], &["--force", "--json", "-q"]].concat());
+        let json: serde_json::Value = serde_json::from_slice(&json.stdout).expect("JSON");
+        assert_eq!(json["steps"][1]["sigma"].to_string(), "0.02");
+        assert_eq!(json["differences"].as_array().expect("a list").len(), 1);
+    }
+
+    #[test]
+    fn what_would_turn_nothing_is_refused() {
+        let photo = stained();
+        let refused = |inputs: &Inputs<'_>, params: &TileParams| {
+            let error = tiles(&ctx(), inputs, params, 1).expect_err("refused");
+            assert!(matches!(error, Error::Parameter { name: "stationarity", .. }), "{error}");
+            error.to_string()
+        };
+        let params = TileParams { stationarity: Some(0.5), ..draft(48, 48) };
+        let inputs = Inputs::new(&photo);
+        let both = TileParams { sigma: 0.2, ..params.clone() };
+        assert!(refused(&inputs, &both).contains("with `sigma`"));
+        for stationarity in [-0.1, 1.1, f32::NAN] {
+            let params = TileParams { stationarity: Some(stationarity), ..params.clone() };
+            assert!(refused(&inputs, &params).contains("0 to 1"));
+        }
+        for method in [Method::WrapOnly, Method::NoWrap, Method::MakeSeamless] {
+            refused(&inputs, &TileParams { method, ..params.clone() });
+        }
+        let error = palette(&ctx(), &inputs, &draft(48, 48), 1).expect_err("one step");
+        assert!(matches!(error, Error::Parameter { name: "steps", .. }), "{error}");
+        let error = palette(&ctx(), &inputs, &TileParams { sigma: 0.2, ..draft(48, 48) }, 3);
+        let error = error.expect_err("sigma");
+        assert!(matches!(error, Error::Parameter { name: "sigma", .. }), "{error}");
+    }
+}

@@ -19,7 +19,9 @@ def test_names_order_and_defaults_are_those_of_the_core(function: Callable[..., 
     assert schema
     assert [p.name for p in options][: len(schema)] == [entry["name"] for entry in schema]
     for option, entry in zip(options, schema, strict=False):
-        shown = "auto" if option.default is None else option.default
+        # What is left out: no number, or the size that fits.
+        nothing = "none" if entry["kind"] == "optional number" else "auto"
+        shown = nothing if option.default is None else option.default
         if entry["kind"] == "number":
             assert float(entry["default"]) == shown
         else:

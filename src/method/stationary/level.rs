@@ -108,6 +108,8 @@ pub(super) struct Level {
     pub(super) quantiles: [Quantiles; 4],
     /// Uniformity cost of using a patch as often as the average, in squared codes.
     pub(super) usage_unit: f32,
+    /// One code in units of L*a*b*.
+    pub(super) unit: f32,
     /// The mean squared distance of a patch from the mean colour, in squared codes.
     pub(super) patch_variance: f64,
     /// What rare places cost.
@@ -305,7 +307,8 @@ fn level(
     let usage_unit = (USAGE_SHARE * variance * (patch * patch) as f64) as f32;
     let rarity = PlaceCost::free(&source);
     let photos = Vec::new();
-    let level = Level { size, source, quantiles, usage_unit, patch_variance, rarity, photos };
+    let unit = 1.0 / codes.scale;
+    let level = Level { size, source, quantiles, usage_unit, unit, patch_variance, rarity, photos };
     Some((level, flags))
 }
 

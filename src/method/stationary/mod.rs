@@ -4,6 +4,7 @@
 //! same loop without wrap or without projection gives the baselines.
 
 mod balance;
+mod dial;
 mod kept;
 mod level;
 
@@ -29,6 +30,7 @@ use crate::signal::resample::resized;
 use crate::signal::window::{Domain, Window};
 
 use balance::Balance;
+pub use dial::{Dial, SIGMAS};
 pub use kept::Kept;
 use level::Level;
 
@@ -149,8 +151,13 @@ impl Exemplar {
 
     /// Steps of progress that one [`run`] counts.
     pub fn work(&self, plan: &Plan) -> u64 {
+        self.work_down_to(plan, 0)
+    }
+
+    /// The same for the levels from the coarsest to `finest`.
+    fn work_down_to(&self, plan: &Plan, finest: usize) -> u64 {
         let area = |l: &Level| (l.size.0 * l.size.1) as u64;
-        let levels = self.levels.iter().enumerate();
+        let levels = self.levels.iter().enumerate().skip(finest);
         levels
             .map(|(j, l)| u64::from(effort(plan, l, j + 1 == self.levels.len()).0) * area(l))
             .sum()
@@ -168,12 +175,47 @@ pub fn run(
     plan: &Plan,
     mut watch: Option<Watch<'_>>,
 ) -> Result<SourceMap> {
+    let field = synthesize(ctx, exemplar, plan, 0, watch.as_mut())?;
+    let finest = &exemplar.levels[0];
+    let mut yx = centers(&field, plan.patch);
+    let mut votes = vote(ctx.simd, &field, &finest.source, plan.wrap);
+    let kept = plan.kept.as_ref().map(|kept| kept.at_level(plan.size, &finest.source));
+    if let Some(kept) = &kept {
+        kept.restore(&mut votes, &finest.source, plan.wrap);
+    }
+    let fixed = kept.as_ref().map(|kept| kept.place(&mut yx));
+    let canvas = seams::Canvas {
+        source: &finest.source.image,
+        atlas: &finest.source.atlas,
+        usable: exemplar.usable.as_deref(),
+        fixed: fixed.as_deref(),
+        target: &without_apron(&votes, plan, plan.size),
+        wrap: plan.wrap,
+    };
+    seams::settle(ctx, &canvas, &mut yx, SEAM_SWEEPS)?;
+    let map = named(yx, &finest.source.atlas, &exemplar.sizes, plan.size)?;
+    if let Some(watch) = watch {
+        let iteration = effort(plan, finest, exemplar.levels.len() == 1).0 + 1;
+        watch(&Look { level: 0, iteration, photos: &finest.photos, map: map.clone() })?;
+    }
+    Ok(map)
+}
+
+/// Goes through the levels from the coarsest down to number `finest`: where every pixel's patch is
+/// matched there.
+fn synthesize(
+    ctx: &Ctx,
+    exemplar: &Exemplar,
+    plan: &Plan,
+    finest: usize,
+    mut watch: Option<&mut Watch<'_>>,
+) -> Result<Field> {
     let levels = &exemplar.levels;
     let n_coarse = levels.len() - 1;
     let mut pass = 0;
     let mut balance = Balance::new(exemplar.sizes.len());
     let mut field: Option<Field> = None;
-    for (j, level) in levels.iter().enumerate().rev() {
+    for (j, level) in levels.iter().enumerate().skip(finest).rev() {
         let (h, w) = level.size;
         let mut f = match field.take() {
             None => Field::random(h, w, &level.source, ctx.seed),
@@ -235,30 +277,7 @@ pub fn run(
         }
         field = Some(f);
     }
-    let field = field.expect("there is at least one level");
-    let finest = &levels[0];
-    let mut yx = centers(&field, plan.patch);
-    let mut votes = vote(ctx.simd, &field, &finest.source, plan.wrap);
-    let kept = plan.kept.as_ref().map(|kept| kept.at_level(plan.size, &finest.source));
-    if let Some(kept) = &kept {
-        kept.restore(&mut votes, &finest.source, plan.wrap);
-    }
-    let fixed = kept.as_ref().map(|kept| kept.place(&mut yx));
-    let canvas = seams::Canvas {
-        source: &finest.source.image,
-        atlas: &finest.source.atlas,
-        usable: exemplar.usable.as_deref(),
-        fixed: fixed.as_deref(),
-        target: &without_apron(&votes, plan, plan.size),
-        wrap: plan.wrap,
-    };
-    seams::settle(ctx, &canvas, &mut yx, SEAM_SWEEPS)?;
-    let map = named(yx, &finest.source.atlas, &exemplar.sizes, plan.size)?;
-    if let Some(watch) = watch {
-        let iteration = effort(plan, finest, n_coarse == 0).0 + 1;
-        watch(&Look { level: 0, iteration, photos: &finest.photos, map: map.clone() })?;
-    }
-    Ok(map)
+    Ok(field.expect("there is at least one level"))
 }
 
 /// The pixel in the middle of each matched patch.

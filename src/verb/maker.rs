@@ -1,0 +1,386 @@
+//! [`Maker`]: what all tiles of a run share.
+
+use std::time::{Duration, Instant};
+
+use crate::analyze::{stationarity, texture};
+use crate::base::ctx::Ctx;
+use crate::base::error::{Error, Result};
+use crate::base::memory::ensure_available;
+use crate::base::params::Value as _;
+use crate::image::color::ColorModel;
+use crate::image::mask::Mask;
+use crate::image::material::MapKind;
+use crate::image::picture::Picture;
+use crate::image::sigma_map::SigmaMap;
+use crate::image::sourcemap::SourceMap;
+use crate::method::make_seamless;
+use crate::method::stationary::{self, Dial, Evenness, Exemplar, Kept};
+use crate::search::patchmatch::Wrap;
+use crate::signal::measure::Statistic;
+use crate::signal::window::Domain;
+use crate::verb::inputs::Inputs;
+use crate::verb::params::{Axis, Measure, Method, Quality, Size, Symmetries, TileParams};
+use crate::verb::tile::{Costs, MAX_VARIANTS, Report, Step, Tile};
+
+/// Longest side of a tile, in pixels.
+const MAX_TILE_SIDE: usize = 32_768;
+
+/// Least radius of the flattening: what is smaller than this share of the photo is texture.
+const LEAST_FLATTEN: f32 = 0.02;
+
+/// Photos that were checked and analysed, ready for tiles of any seed and sigma.
+#[derive(Debug)]
+pub(super) struct Maker<'a> {
+    inputs: &'a Inputs<'a>,
+    params: &'a TileParams,
+    /// Width and height of the tiles.
+    size: (usize, usize),
+    plan: stationary::Plan,
+    /// The flattened photos, if they are used.
+    flat: Option<Vec<Picture>>,
+    /// `None` for the method that blends.
+    exemplar: Option<Exemplar>,
+    notes: Vec<String>,
+    /// How the look depends on sigma, once that was found out.
+    dial: Option<Dial>,
+    /// Stages that the tiles share.
+    seconds: Vec<(&'static str, f64)>,
+}
+
+impl<'a> Maker<'a> {
+    /// Checks that `count` tiles can be made, and analyses the photos.
+    ///
+    /// # Errors
+    /// See [`tiles`](crate::tiles).
+    pub(super) fn new(
+        ctx: &Ctx,
+        inputs: &'a Inputs<'a>,
+        params: &'a TileParams,
+        count: usize,
+    ) -> Result<Self> {
+        let start = Instant::now();
+        let (width, height) = check(inputs, params, count)?;
+        let wrap = Wrap { y: params.axis != Axis::X, x: params.axis != Axis::Y };
+        let masks = inputs.usable(params)?;
+        let mut notes = Vec::new();
+        if masks[0].is_some() && params.method == Method::MakeSeamless {
+            notes.push(
+                "the method make-seamless uses the whole photo; the mask is ignored".to_owned(),
+            );
+        }
+        if inputs.sigma_map.is_some() && !makes_stationary(params) {
+            notes.push("nothing is made stationary; the sigma map changes no pixel".to_owned());
+        }
+        let mut plan = plan(params, inputs.sigma_map, (height, width), wrap);
+        if params.band > 0 {
+            let photo = (inputs.photo.height(), inputs.photo.width());
+            let usable = masks[0].as_ref().map(Mask::usable);
+            plan.kept = Some(Kept::middle(photo, usable, (height, width), params.band, wrap));
+        }
+        let (flat, exemplar) = ctx.install(|| {
+            let flat = inputs.flattened(&masks, params, &mut notes)?;
+            if params.method == Method::MakeSeamless {
+                return Ok((flat, None));
+            }
+            let photos = inputs.photos(flat.as_deref());
+            let photos: Vec<_> = photos.into_iter().zip(masks.iter().map(Option::as_ref)).collect();
+            let symmetries = params.symmetry.list();
+            let exemplar = Exemplar::new(ctx, &photos, symmetries, &plan, inputs.trace)?;
+            Ok((flat, Some(exemplar)))
+        })?;
+        let size = (width, height);
+        let seconds = vec![("analysis", start.elapsed().as_secs_f64())];
+        Ok(Self { inputs, params, size, plan, flat, exemplar, notes, dial: None, seconds })
+    }
+
+    /// Steps of progress of `count` tiles, and of the dial.
+    pub(super) fn work(&self, count: usize, with_dial: bool) -> u64 {
+        let Some(exemplar) = &self.exemplar else { return 0 };
+        let dial = if with_dial { Dial::work(exemplar, &self.plan) } else { 0 };
+        exemplar.work(&self.plan) * count as u64 + dial
+    }
+
+    /// Finds out how the tile's look depends on sigma.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`].
+    pub(super) fn learn_dial(&mut self, ctx: &Ctx) -> Result<&Dial> {
+        let start = Instant::now();
+        let Some(exemplar) = &self.exemplar else {
+            return Err(Error::Internal { message: "a dial without an exemplar".into() });
+        };
+        let dial = ctx.install(|| Dial::new(ctx, exemplar, &self.plan))?;
+        self.seconds.push(("dial", start.elapsed().as_secs_f64()));
+        Ok(self.dial.insert(dial))
+    }
+
+    /// Makes the tile of a seed: with the sigma of the parameters, or of a place on the dial.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`].
+    pub(super) fn make(&self, ctx: &Ctx, seed: u64, stationarity: Option<f32>) -> Result<Tile> {
+        let start = Instant::now();
+        let ctx = ctx.with_seed(seed);
+        let (width, height) = self.size;
+        let mut params = self.params.clone();
+        params.size = Size::Pixels { width, height };
+        params.stationarity = None;
+        if let (Some(dial), Some(stationarity)) = (&self.dial, stationarity) {
+            params.sigma = dial.sigma(stationarity);
+        }
+        let mut plan = self.plan.clone();
+        if let Some(evenness) = &mut plan.evenness {
+            evenness.sigma = params.sigma;
+        }
+        let photos = self.inputs.photos(self.flat.as_deref());
+        let measured = |photos: &[&Picture], picture: &Picture, map: Option<&SourceMap>| {
+            costs(photos, picture, map, &params, self.inputs.sigma_map, plan.wrap)
+        };
+        let (mut trace, mut tracing) = (Vec::new(), Duration::ZERO);
+        let mut look = |look: &stationary::Look<'_>| {
+            let since = Instant::now();
+            let photos: Vec<&Picture> = look.photos.iter().collect();
+            let picture = look.map.apply_all(&photos, MapKind::Color)?;
+            let costs = measured(&photos, &picture, Some(&look.map));
+            trace.push(Step { level: look.level, iteration: look.iteration, costs });
+            tracing += since.elapsed();
+            Ok(())
+        };
+        let watch: Option<stationary::Watch<'_>> =
+            if self.inputs.trace { Some(&mut look) } else { None };
+        let (picture, source_map) = ctx.install(|| match &self.exemplar {
+            None => Ok((make_seamless::run(photos[0], (height, width), plan.wrap)?, None)),
+            Some(exemplar) => {
+                let map = stationary::run(&ctx, exemplar, &plan, watch)?;
+                Ok((map.apply_all(&photos, MapKind::Color)?, Some(map)))
+            }
+        })?;
+        let made = start.elapsed();
+        let costs = ctx.install(|| Ok(measured(&photos, &picture, source_map.as_ref())))?;
+        let own = [
+            Some(("synthesis", made.saturating_sub(tracing).as_secs_f64())),
+            self.inputs.trace.then_some(("trace", tracing.as_secs_f64())),
+            Some(("costs", start.elapsed().saturating_sub(made).as_secs_f64())),
+        ];
+        let report = Report {
+            version: env!("CARGO_PKG_VERSION"),
+            seed,
+            params: params.show(),
+            sigma: params.sigma,
+            stationarity,
+            photo_size: (photos[0].width(), photos[0].height()),
+            also_sizes: photos[1..].iter().map(|p| (p.width(), p.height())).collect(),
+            tile_size: self.size,
+            costs,
+            seconds: self.seconds.iter().copied().chain(own.into_iter().flatten()).collect(),
+            notes: self.notes.clone(),
+        };
+        Ok(Tile { picture, source_map, report, trace })
+    }
+}
+
+/// Whether anything is made equal everywhere.
+fn makes_stationary(params: &TileParams) -> bool {
+    params.method == Method::Stationary && params.measure != Measure::None
+}
+
+/// Checks everything that can be known before the work; returns the tile's width and height.
+fn check(inputs: &Inputs<'_>, params: &TileParams, count: usize) -> Result<(usize, usize)> {
+    params.validate()?;
+    if let Some(stationarity) = params.stationarity {
+        check_dial(inputs, params, stationarity)?;
+    }
+    if !(1..=MAX_VARIANTS).contains(&count) {
+        return Err(Error::parameter("variants", format!("1 to {MAX_VARIANTS}"), count));
+    }
+    if count > 1 && params.method == Method::MakeSeamless {
+        let expected = "1 with the method make-seamless, which makes no random choices";
+        return Err(Error::parameter("variants", expected, count));
+    }
+    if params.flatten > 0.0 && params.flatten < LEAST_FLATTEN {
+        let expected = format!("0 (off) or {LEAST_FLATTEN} to 1; less is texture, not light");
+        return Err(Error::parameter("flatten", expected, params.flatten));
+    }
+    if params.patch.is_multiple_of(2) {
+        return Err(Error::parameter("patch", "odd, so that a patch has a middle", params.patch));
+    }
+    if params.measure != Measure::Moments && params.order != TileParams::default().order {
+        let expected = "left out unless the measure is `moments`";
+        return Err(Error::parameter("order", expected, params.order));
+    }
+    let photo = inputs.photo;
+    let (width, height) = params.resolved_size(photo.width(), photo.height());
+    let sides = 1..=MAX_TILE_SIDE;
+    if !sides.contains(&width) || !sides.contains(&height) {
+        let expected = format!("1x1 to {MAX_TILE_SIDE}x{MAX_TILE_SIDE} pixels");
+        return Err(Error::parameter("size", expected, format!("{width}x{height}")));
+    }
+    let too_small = |what: &str, width: usize, height: usize, remedy: &str| Error::TooSmall {
+        what: what.into(),
+        width,
+        height,
+        need: params.patch,
+        remedy: remedy.into(),
+    };
+    let (pw, ph) = (photo.width(), photo.height());
+    if params.method == Method::MakeSeamless {
+        if width > pw || height > ph {
+            let expected = format!("at most the photo's {pw}x{ph} with the method make-seamless");
+            return Err(Error::parameter("size", expected, format!("{width}x{height}")));
+        }
+    } else if width.min(height) < params.patch {
+        return Err(too_small(
+            "the tile",
+            width,
+            height,
+            "choose a smaller patch or a larger size",
+        ));
+    }
+    if params.band > 0 {
+        check_band(params, (pw, ph), (width, height))?;
+    }
+    let photos = inputs.photos(None);
+    for (i, photo) in photos.iter().enumerate() {
+        let what = if i == 0 { "the photo".to_owned() } else { format!("photo {}", i + 1) };
+        let (pw, ph) = (photo.width(), photo.height());
+        if params.method != Method::MakeSeamless && pw.min(ph) < params.patch {
+            return Err(too_small(&what, pw, ph, "choose a smaller patch or a larger photo"));
+        }
+        photo.ensure_like(photos[0], &what)?;
+        photo.ensure_finite(&what)?;
+    }
+    if params.method == Method::MakeSeamless {
+        let expected = "left out with the method make-seamless, which uses one photo as it lies";
+        if photos.len() > 1 {
+            return Err(Error::parameter("also", expected, photos.len() - 1));
+        }
+        if params.symmetry != Symmetries::None {
+            return Err(Error::parameter("symmetry", expected, params.symmetry.show()));
+        }
+    }
+    if let Some(map) = inputs.sigma_map {
+        map.ensure_size(height, width)?;
+    }
+    // A filtered channel is eleven planes of floats; a sigma map has up to eight planes of weights.
+    let filtered = if params.measure == Measure::Steerable { 44 } else { 0 };
+    let mapped = if inputs.sigma_map.is_some() { 48 } else { 0 };
+    let measured = (width * height) as u64 * (filtered + mapped);
+    // Every tile with its source map stays until the last is made; flattened photos are copies.
+    let tile = (width * height) as u64 * (photo.byte_len() / (pw * ph)) as u64;
+    let others = (tile + 12 * (width * height) as u64).checked_mul(count as u64 - 1);
+    let bytes: u64 = photos.iter().map(|photo| photo.byte_len() as u64).sum();
+    let flat = if params.flatten > 0.0 { bytes } else { 0 };
+    let sizes: Vec<_> = photos.iter().map(|photo| (photo.height(), photo.width())).collect();
+    let symmetries = params.symmetry.list();
+    let work = stationary::memory_bytes(&sizes, symmetries, (height, width));
+    let need = others
+        .zip(work)
+        .and_then(|(others, work)| work.checked_add(tile + flat + measured + others));
+    let what = if count > 1 { format!("{count} tiles of") } else { "a tile of".to_owned() };
+    let from = match photos.len() * symmetries.len() {
+        1 => format!("a {pw}x{ph} photo"),
+        views => format!("{views} views of photos of {pw}x{ph} and so on"),
+    };
+    ensure_available(&format!("{what} {width}x{height} from {from}"), need)?;
+    Ok((width, height))
+}
+
+/// Checks that the dial has something to turn, and that nothing else turns it.
+fn check_dial(inputs: &Inputs<'_>, params: &TileParams, stationarity: f32) -> Result<()> {
+    let refused = |expected: &str| Err(Error::parameter("stationarity", expected, stationarity));
+    if !(0.0..=1.0).contains(&stationarity) {
+        return refused("0 to 1");
+    }
+    if !makes_stationary(params) {
+        return refused("left out unless the method is stationary, with a measure");
+    }
+    if params.sigma.to_bits() != TileParams::default().sigma.to_bits() {
+        return refused("left out with `sigma`: both say how even the tile becomes; give one");
+    }
+    if inputs.sigma_map.is_some() {
+        return refused("left out with a sigma map: both say how even the tile becomes; give one");
+    }
+    Ok(())
+}
+
+/// Checks that a border of `params.band` pixels leaves a middle that the photo has.
+fn check_band(
+    params: &TileParams,
+    (photo_width, photo_height): (usize, usize),
+    (width, height): (usize, usize),
+) -> Result<()> {
+    if !matches!(params.method, Method::Stationary | Method::WrapOnly) {
+        let expected = "0 unless the method is stationary or wrap-only";
+        return Err(Error::parameter("band", expected, params.band));
+    }
+    if width > photo_width || height > photo_height {
+        let expected = format!("at most the photo's {photo_width}x{photo_height} with a band");
+        return Err(Error::parameter("size", expected, format!("{width}x{height}")));
+    }
+    let side = match params.axis {
+        Axis::Both => width.min(height),
+        Axis::X => width,
+        Axis::Y => height,
+    };
+    let most = side.saturating_sub(1) / 2;
+    if params.band < params.patch || params.band > most {
+        let least = params.patch;
+        let expected = format!(
+            "{least} (the patch side) to {most}, which leaves a middle of {width}x{height}"
+        );
+        return Err(Error::parameter("band", expected, params.band));
+    }
+    Ok(())
+}
+
+fn plan(
+    params: &TileParams,
+    sigma_map: Option<&SigmaMap>,
+    size: (usize, usize),
+    wrap: Wrap,
+) -> stationary::Plan {
+    let even = params.method == Method::Stationary;
+    let wraps = params.method != Method::NoWrap;
+    let (coarse_iterations, fine_iterations) = match params.quality {
+        Quality::Draft => (12, 1),
+        Quality::Normal => (30, 2),
+        Quality::Best => (60, 6),
+    };
+    stationary::Plan {
+        size,
+        wrap: Wrap { y: wrap.y && wraps, x: wrap.x && wraps },
+        evenness: params.evenness(sigma_map).filter(|_| even),
+        patch: params.patch,
+        uniformity: params.uniformity,
+        rarity: if even { params.rarity } else { 0.0 },
+        kept: None,
+        coarse_iterations,
+        fine_iterations,
+    }
+}
+
+fn costs(
+    photos: &[&Picture],
+    picture: &Picture,
+    map: Option<&SourceMap>,
+    params: &TileParams,
+    sigma_map: Option<&SigmaMap>,
+    wrap: Wrap,
+) -> Costs {
+    let model = ColorModel::new(photos[0]);
+    let mut pixels = model.averaging_pixels(picture);
+    model.space().convert_row(&mut pixels);
+    let (height, width) = (picture.height(), picture.width());
+    let domain = Domain { height, width, wrap_y: wrap.y, wrap_x: wrap.x };
+    let sigma = f64::from(params.sigma) * height.min(width) as f64;
+    let stationarity = stationarity::histogram_cost(&pixels, domain, sigma);
+    let by_measure = |evenness: Evenness| match evenness.statistic {
+        Statistic::Histogram if sigma_map.is_none() => stationarity,
+        other => other.cost(&pixels, domain, &evenness.window((height, width), domain)),
+    };
+    Costs {
+        texture: map.map(|map| texture::cost_bound(picture, photos, map, params.patch, wrap)),
+        stationarity,
+        stationarity_by_measure: params.evenness(sigma_map).map(by_measure),
+    }
+}
