@@ -511,9 +511,9 @@ def save_source_map(tile: Tile, path: PathType, *, overwrite: bool) -> None:
 
 def save_tile(tile: Tile, path: PathType, *, overwrite: bool) -> None:
     """See `Tile.save`."""
-    kinds = {param["name"]: param["kind"] for param in _texforge.schema()}
+    texts = {param["name"] for param in _texforge.schema() if param["kind"] in ("choice", "size")}
     params = {
-        name: json.loads(text) if kinds.get(name) in ("integer", "number") else text
+        name: text if name in texts else None if text == "none" else json.loads(text)
         for name, text in tile.report["params"]
     }
     # As the command line writes it, so that equal tiles make equal files.

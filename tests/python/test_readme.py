@@ -67,6 +67,8 @@ def test_the_commands_run_as_they_stand(tmp_path: Path) -> None:
         outputs = [command[command.index("-o") + 1]] if "-o" in command else []
         if "--variants" in command:
             outputs = ["several-1.png", "several-2.png", "several-3.png"]
+        if "palette" in command:
+            outputs = ["choice-1.png", "choice-4.png", "choice.palette.png"]
         assert all((tmp_path / output).is_file() for output in outputs), command
 
 
