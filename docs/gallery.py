@@ -96,10 +96,8 @@ def row(path: Path, out: Path, seed: int, side: int, page: Page) -> list[contact
     return cells
 
 
-def gradient_of_sigma(path: Path, seed: int, side: int) -> list[contact.Cell]:
-    """Tile one photograph with a reach that grows from left to right (the paper's Fig. 10)."""
-    photo = photos.reduced(texforge.read_image(path), side)
-    side = min(side, *photo.shape[:2])
+def gradient_of_sigma(photo: texforge.Image, seed: int, side: int) -> list[contact.Cell]:
+    """Tile a photograph with a reach that grows from left to right (the paper's Fig. 10)."""
     ramp = np.geomspace(0.02, 0.6, side, dtype=np.float32)
     cells: list[contact.Cell] = []
     for label, sigma_map in (
@@ -107,8 +105,46 @@ def gradient_of_sigma(path: Path, seed: int, side: int) -> list[contact.Cell]:
         ("sigma 0.02 (left) to 0.6 (right)", np.tile(ramp, (side, 1))),
     ):
         tile = texforge.tile(photo, size=side, seed=seed, axis="y", sigma_map=sigma_map)
-        cells.append((f"{path.name}: {label}", contact.shown(tile.image, tile.encoding)))
+        cells.append((label, contact.shown(tile.image, tile.encoding)))
     return cells
+
+
+def repeated(tile: texforge.Tile) -> Image.Image:
+    """Return a tile two by two, at half its size."""
+    return scaled(contact.shown(tile.tiled(2, 2), tile.encoding), 0.5)
+
+
+def rarity(photo: texforge.Image, seed: int, side: int) -> list[contact.Cell]:
+    """Tile a photograph with single things held back more and more."""
+    return [
+        (f"rarity {dial}", repeated(texforge.tile(photo, size=side, seed=seed, rarity=dial)))
+        for dial in (0.0, 0.5, 1.0, 2.0)
+    ]
+
+
+def palette(photo: texforge.Image, seed: int, side: int) -> list[contact.Cell]:
+    """Tile a photograph more and more evenly, in steps that look alike."""
+    steps = texforge.palette(photo, size=side, seed=seed)
+    places = zip(steps.stationarities, steps.sigmas, steps.tiles, strict=True)
+    return [
+        (f"stationarity {place:.2f}, sigma {sigma:.3g}", repeated(tile))
+        for place, sigma, tile in places
+    ]
+
+
+OPTIONS = {"gradients": gradient_of_sigma, "rarity": rarity, "palette": palette}
+"""What an option does to every photo: a sheet of a class each."""
+
+
+def option_sheet(name: str, paths: list[Path], seed: int, side: int) -> Image.Image:
+    """Show what one option does to the photographs of a class."""
+    rows = []
+    for path in paths:
+        photo = photos.reduced(texforge.read_image(path), side)
+        fitting = min(side, *photo.shape[:2])
+        (label, first), *others = OPTIONS[name](photo, seed, fitting)
+        rows.append([(f"{path.name}: {label}", first), *others])
+    return contact.sheet(rows)
 
 
 def write_index(out: Path, pages: list[Page]) -> None:
@@ -141,7 +177,9 @@ def main() -> int:
     parser.add_argument("--class", dest="classes", nargs="+", default=[], help="only these")
     parser.add_argument("--only", default="", help="part of the path that must match")
     parser.add_argument("--size", type=int, default=384, help="side of a tile, at most")
-    parser.add_argument("--gradients", action="store_true", help="also sigma growing to the right")
+    parser.add_argument(
+        "--options", nargs="+", default=[], choices=OPTIONS, help="also sheets of what these do"
+    )
     parser.add_argument("--seeds", type=int, nargs="+", default=[0])
     arguments = parser.parse_args()
     folder: Path = arguments.folder
@@ -162,9 +200,10 @@ def main() -> int:
                 except (texforge.TexforgeError, ValueError, OSError) as error:
                     page.failures.append(f"{path.name}, seed {seed}: {error}")
                     print(f"{path}: failed: {error}", file=sys.stderr, flush=True)
-        if arguments.gradients:
-            found = [gradient_of_sigma(path, arguments.seeds[0], arguments.size) for path in paths]
-            contact.sheet(found).save(arguments.out / f"{name}_gradients.png")
+        for option in arguments.options:
+            sheet = option_sheet(option, paths, arguments.seeds[0], arguments.size)
+            sheet.save(arguments.out / f"{name}_{option}.png")
+            print(f"wrote {arguments.out / f'{name}_{option}.png'}", flush=True)
         if rows:
             page.sheet = f"{name}.png"
             contact.sheet(rows).save(arguments.out / page.sheet)

@@ -135,18 +135,27 @@ def test_a_palette_can_be_stopped() -> None:
 
 @pytest.mark.skipif(not STAINS.is_dir(), reason="needs the photographs in ../shared/exemplars")
 def test_the_steps_look_even() -> None:
-    """On real photographs, equal steps of the dial differ alike; those of sigma do not.
+    """On real photographs, equal steps of the dial differ alike; even factors of sigma do not.
 
     The spread is the standard deviation of the steps' differences over their mean. A single step
     is left to chance: the look of one tile of one seed is measured.
     """
-    spreads = []
+
+    def spread(differences: npt.NDArray[np.float64]) -> float:
+        return float(np.std(differences) / np.mean(differences))
+
+    dial, factors = [], []
     for path in sorted(STAINS.iterdir()):
         if path.suffix.lower() not in {".png", ".jpg"}:
             continue
         photo = reduced(texforge.read_image(path))
-        differences = texforge.palette(photo, 5, size=256).differences
-        spreads.append(statistics.pstdev(differences) / statistics.fmean(differences))
-    assert len(spreads) >= 10
-    assert statistics.median(spreads) <= 0.4, spreads
-    assert max(spreads) <= 0.9, spreads
+        palette = texforge.palette(photo, 5, size=256)
+        dial.append(spread(np.array(palette.differences)))
+        sigmas, changes = np.array(palette.curve).T
+        even = np.geomspace(sigmas[0], sigmas[-1], 5)
+        factors.append(spread(np.diff(np.interp(-np.log(even), -np.log(sigmas), changes))))
+    print("spread, median:", statistics.median(dial), "even factors:", statistics.median(factors))
+    assert len(dial) >= 10
+    assert statistics.median(dial) <= 0.4, dial
+    assert max(dial) <= 0.9, dial
+    assert statistics.median(dial) < statistics.median(factors), factors

@@ -26,6 +26,9 @@ const CLOSE: f64 = 1.03;
 /// dial is the same whatever the user's seed is.
 const SEEDS: [u64; 2] = [0, 1];
 
+/// Iterations at the coarsest level, at most: those of a draft show the look well enough.
+const ITERATIONS: u32 = 12;
+
 /// Shorter side of the level at which the look is judged, at most, in pixels.
 const SIDE: usize = 192;
 
@@ -91,7 +94,7 @@ impl Dial {
     /// Most steps of progress that [`Dial::new`] counts.
     pub fn work(exemplar: &Exemplar, plan: &Plan) -> u64 {
         let runs = (FIRST + ROUNDS * PER_ROUND) * SEEDS.len();
-        exemplar.work_down_to(plan, judged(exemplar)) * runs as u64
+        exemplar.work_down_to(&trial(plan), judged(exemplar)) * runs as u64
     }
 
     /// The sigma at `stationarity`: 0 evens out least, 1 most. Three digits, so that it can be read.
@@ -133,6 +136,12 @@ fn judged(exemplar: &Exemplar) -> usize {
     exemplar.levels.iter().position(small).unwrap_or(exemplar.levels.len() - 1)
 }
 
+/// The plan of a tile that is only looked at.
+fn trial(plan: &Plan) -> Plan {
+    let coarse_iterations = plan.coarse_iterations.min(ITERATIONS);
+    Plan { coarse_iterations, kept: None, ..plan.clone() }
+}
+
 /// Puts a trial between two neighbours. The way over it is longer than the straight one by what is
 /// chance, so both parts are shortened alike.
 fn insert(trials: &mut Vec<Trial>, i: usize, mut trial: Trial) {
@@ -155,7 +164,7 @@ fn tried(
 ) -> Result<Vec<Trial>> {
     let look = |(sigma, seed): (f64, u64)| {
         let evenness = plan.evenness.clone().map(|e| Evenness { sigma: sigma as f32, ..e });
-        let plan = Plan { evenness, kept: None, ..plan.clone() };
+        let plan = Plan { evenness, ..trial(plan) };
         let field = synthesize(&ctx.with_seed(seed), exemplar, &plan, finest, None)?;
         let level = &exemplar.levels[finest];
         let color = |[y, x]: [u32; 2]| {
@@ -169,12 +178,12 @@ fn tried(
     };
     let runs: Vec<_> = sigmas.iter().flat_map(|&sigma| SEEDS.map(|seed| (sigma, seed))).collect();
     let looks = runs.into_par_iter().map(look).collect::<Result<Vec<_>>>()?;
-    let trial = |(&sigma, looks): (&f64, &[Appearance])| Trial {
+    let trials = |(&sigma, looks): (&f64, &[Appearance])| Trial {
         sigma,
         look: Appearance::typical(looks),
         change: 0.0,
     };
-    Ok(sigmas.iter().zip(looks.chunks_exact(SEEDS.len())).map(trial).collect())
+    Ok(sigmas.iter().zip(looks.chunks_exact(SEEDS.len())).map(trials).collect())
 }
 
 #[cfg(test)]

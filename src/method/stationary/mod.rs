@@ -47,6 +47,10 @@ const CONTRAST_PULL: f32 = 0.5;
 /// likeness (a higher texture cost), less leaves patches of shade that show when tiled.
 const FINE_PROJECTION: f32 = 0.75;
 
+/// Standard deviation of the narrowest window, in pixels of a level. The dozen pixels in it are too few
+/// for a distribution; still narrower ones only cost time at the coarse levels.
+const LEAST_WINDOW: f64 = 2.0;
+
 /// Sweeps of the seam placement; after three hardly a pixel moves.
 const SEAM_SWEEPS: u32 = 3;
 
@@ -89,7 +93,7 @@ impl Evenness {
     pub fn window(&self, (height, width): (usize, usize), domain: Domain) -> Window {
         let side = height.min(width) as f32;
         let Some(map) = &self.sigma_map else {
-            return Window::even(f64::from(self.sigma) * f64::from(side));
+            return Window::even((f64::from(self.sigma) * f64::from(side)).max(LEAST_WINDOW));
         };
         let gray: Vec<[f32; 3]> = map.values().iter().map(|&v| [v; 3]).collect();
         let small = resized(&gray, map.size(), (height, width));
@@ -97,7 +101,8 @@ impl Evenness {
         let inside = |i: usize, n: usize, all: usize| i.saturating_sub((all - n) / 2).min(n - 1);
         let at = |i: usize| {
             let y = inside(i / domain.width, height, domain.height);
-            small[y * width + inside(i % domain.width, width, domain.width)][0] * side
+            let sigma = small[y * width + inside(i % domain.width, width, domain.width)][0];
+            (sigma * side).max(LEAST_WINDOW as f32)
         };
         let sigmas: Vec<f32> = (0..domain.height * domain.width).map(at).collect();
         Window::prescribed(&sigmas)
