@@ -16,9 +16,11 @@ use crate::cli::{args, files, preview};
 use crate::image::mask::Mask;
 use crate::image::material::{MapKind, Sibling};
 use crate::image::picture::Picture;
+use crate::image::rect::Rect;
 use crate::image::sigma_map::SigmaMap;
 use crate::verb::inputs::Inputs;
 use crate::verb::params::{Method, TileParams};
+use crate::verb::redo::Redo;
 use crate::verb::tile::{Tile, tiles};
 
 /// What was typed, checked as far as it can be without looking at a file.
@@ -32,6 +34,8 @@ struct Request {
     mask: Option<PathBuf>,
     avoid: Option<PathBuf>,
     sigma_map: Option<PathBuf>,
+    /// The rectangle to make anew, and the tile's source map.
+    redo: Option<(Rect, PathBuf)>,
     maps: Vec<Wanted>,
     pick_up: bool,
     force: bool,
@@ -79,6 +83,11 @@ impl Request {
         let maps = matches.get_many::<OsString>("map").into_iter().flatten();
         let maps = maps::typed(maps, photos.len())?;
         let source_map = path("save-source-map");
+        let rect = matches.get_one::<String>("redo").map(|text| {
+            let expected = "a rectangle as WIDTHxHEIGHT+X+Y";
+            Rect::parse(text).ok_or_else(|| Error::parameter("redo", expected, format!("`{text}`")))
+        });
+        let rect = rect.transpose()?;
         let wants = |flag| matches.get_flag(flag);
         let count = matches.get_one::<usize>("variants").copied().unwrap_or(1);
         // Name what contradicts what, before any file is touched.
@@ -108,6 +117,7 @@ impl Request {
             mask: path("mask"),
             avoid: path("avoid"),
             sigma_map: path("sigma-map"),
+            redo: rect.zip(path("redo-of")),
             maps,
             force: wants("force"),
         })
@@ -119,6 +129,7 @@ impl Request {
             .chain(&self.mask)
             .chain(&self.avoid)
             .chain(&self.sigma_map)
+            .chain(self.redo.as_ref().map(|(_, map)| map))
             .map(PathBuf::as_path)
             .collect()
     }
@@ -201,11 +212,16 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Vec
         None => None,
         Some(path) => Some(SigmaMap::from_picture(&files::read(path, MapKind::Data)?)?),
     };
+    let redone = match &request.redo {
+        None => None,
+        Some((rect, path)) => Some((*rect, files::read_source_map(path)?)),
+    };
     let inputs = Inputs {
         also: &also,
         mask: mask.as_ref(),
         avoid: avoid.as_ref(),
         sigma_map: sigma_map.as_ref(),
+        redo: redone.as_ref().map(|(rect, of)| Redo { of, rect: *rect }),
         ..Inputs::new(&photo)
     };
     let maps = read_maps(session, request, &inputs, &mut notes)?;

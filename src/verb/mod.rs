@@ -2,5 +2,6 @@
 
 pub mod inputs;
 pub mod params;
+pub mod redo;
 pub mod texture_cost;
 pub mod tile;

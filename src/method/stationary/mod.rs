@@ -171,17 +171,19 @@ pub fn run(
     let levels = &exemplar.levels;
     let n_coarse = levels.len() - 1;
     let mut pass = 0;
-    let mut balance = Balance::new(exemplar.sizes.len());
+    let balanced = !plan.kept.as_ref().is_some_and(Kept::is_tile);
+    let mut balance = Balance::new(if balanced { exemplar.sizes.len() } else { 1 });
     let mut field: Option<Field> = None;
+    let mut kept = None;
     for (j, level) in levels.iter().enumerate().rev() {
         let (h, w) = level.size;
         let mut f = match field.take() {
             None => Field::random(h, w, &level.source, ctx.seed),
             Some(field) => field.upsampled((h, w), &levels[j + 1].source, &level.source, ctx.seed),
         };
-        let kept = plan.kept.as_ref().map(|kept| kept.at_level((h, w), &level.source));
+        kept = plan.kept.as_ref().map(|kept| kept.at_level(level));
         if let Some(kept) = &kept {
-            kept.hold(&mut f, &level.source);
+            kept.hold(&mut f);
         }
         let coarsest = j == n_coarse;
         let mut usage = PlaceCost::of_usage(&f, &level.source, plan.uniformity * level.usage_unit);
@@ -216,6 +218,10 @@ pub fn run(
             let now = PlaceCost::of_usage(&f, &level.source, plan.uniformity * level.usage_unit);
             usage = now.averaged(&usage);
             let cost = usage.clone().plus(plan.rarity, &level.rarity);
+            let cost = match kept.as_ref().and_then(|kept| kept.former.as_ref()) {
+                Some(former) => cost.plus(1.0, former),
+                None => cost,
+            };
             let search = Search { pass, ..search };
             let unit = f64::from(plan.uniformity) * level.patch_variance;
             let cost = match balance.costs(&f, &level.source, &areas, unit) {
@@ -224,7 +230,7 @@ pub fn run(
             };
             patchmatch::pass(ctx, &target, &level.source, &cost, plan.wrap, search, &mut f)?;
             if let Some(kept) = &kept {
-                kept.hold(&mut f, &level.source);
+                kept.hold(&mut f);
             }
             pass += 1;
             if let Some(watch) = watch.as_mut() {
@@ -239,7 +245,6 @@ pub fn run(
     let finest = &levels[0];
     let mut yx = centers(&field, plan.patch);
     let mut votes = vote(ctx.simd, &field, &finest.source, plan.wrap);
-    let kept = plan.kept.as_ref().map(|kept| kept.at_level(plan.size, &finest.source));
     if let Some(kept) = &kept {
         kept.restore(&mut votes, &finest.source, plan.wrap);
     }
