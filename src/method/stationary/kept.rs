@@ -8,7 +8,7 @@ use crate::method::stationary::level::Level;
 use crate::search::atlas::{Atlas, View};
 use crate::search::field::{Field, Pos};
 use crate::search::patchmatch::Wrap;
-use crate::search::place_cost::PlaceCost;
+use crate::search::place_cost::{PlaceCost, RANDOM_MOST};
 use crate::search::seams::From;
 use crate::search::source::Source;
 use crate::search::vote::Votes;
@@ -17,7 +17,13 @@ use crate::signal::histogram::SOFT_BITS;
 /// Cost of a patch that was in a redone rectangle, as a share of a patch's variance. From less the
 /// rectangle's old content comes back, as it fits its surroundings best; more changes nothing, any
 /// other place is cheaper already.
-const FORMER_SHARE: f64 = 1.0;
+const FORMER_SHARE: f32 = 4.0;
+
+/// What the places of a redone rectangle cost at random, at most, as a share of a patch's variance:
+/// the minimum of a randomly perturbed energy is a sample (Papandreou and Yuille 2011,
+/// Perturb-and-MAP). From less most seeds find the same best filling of a small rectangle; more
+/// chooses places that fit badly.
+const RANDOM_SHARE: f32 = 0.5;
 
 /// Output pixels that are copies of given pixels of the photos.
 #[derive(Debug, Clone)]
@@ -77,8 +83,13 @@ impl Kept {
         matches!(self.part, Part::Outside(_))
     }
 
-    /// What is kept at a level of the pyramid.
-    pub(super) fn at_level(&self, level: &Level) -> KeptLevel {
+    /// What is kept at a level of the pyramid; `coarser` is the one before it.
+    pub(super) fn at_level(
+        &self,
+        level: &Level,
+        coarser: Option<(&Level, &KeptLevel)>,
+        seed: u64,
+    ) -> KeptLevel {
         let (full, size @ (h, w)) = ((self.map.height(), self.map.width()), level.size);
         let source = &level.source;
         let half = source.patch / 2;
@@ -91,7 +102,7 @@ impl Kept {
             }
         };
         let mut of_level =
-            KeptLevel { width: w, pixels: Vec::new(), held: Vec::new(), former: None };
+            KeptLevel { width: w, pixels: Vec::new(), held: Vec::new(), costs: None };
         let mut former = Vec::new();
         for i in 0..h * w {
             let (y, x) = (i / w, i % w);
@@ -119,10 +130,17 @@ impl Kept {
                 }));
             }
         }
-        if !former.is_empty() {
+        if free.is_some() {
             let field = Field { height: 1, width: former.len(), pos: former };
-            let weight = FORMER_SHARE * level.patch_variance;
-            of_level.former = Some(PlaceCost::of_usage(&field, source, weight as f32));
+            let unit = level.patch_variance as f32;
+            let former = PlaceCost::of_usage(&field, source, FORMER_SHARE * unit);
+            let coarser = coarser.and_then(|(level, kept)| Some((level, kept.costs.as_ref()?)));
+            let random = match coarser {
+                Some((level, costs)) => costs.random.resized(&level.source, source),
+                None => PlaceCost::random(source, seed),
+            };
+            let all = former.plus(RANDOM_SHARE * unit / RANDOM_MOST as f32, &random);
+            of_level.costs = Some(Costs { all, random });
         }
         of_level
     }
@@ -160,11 +178,24 @@ pub(super) struct KeptLevel {
     pixels: Vec<(u32, From)>,
     /// Output pixel, and the patch that is matched to it.
     held: Vec<(u32, Pos)>,
-    /// What it costs to use again what is not kept.
-    pub(super) former: Option<PlaceCost>,
+    /// Of a redone rectangle.
+    costs: Option<Costs>,
+}
+
+/// What places cost beside the usual.
+#[derive(Debug)]
+struct Costs {
+    /// Those that the rectangle was made of before, and the random ones.
+    all: PlaceCost,
+    random: PlaceCost,
 }
 
 impl KeptLevel {
+    /// What places cost beside the usual.
+    pub(super) fn cost(&self) -> Option<&PlaceCost> {
+        self.costs.as_ref().map(|costs| &costs.all)
+    }
+
     /// Puts the kept pixels' own codes in the place of what was voted.
     pub(super) fn restore(&self, votes: &mut Votes, source: &Source, wrap: Wrap) {
         let apron = |wraps: bool| if wraps { 0 } else { source.patch / 2 };

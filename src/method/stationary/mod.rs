@@ -30,6 +30,7 @@ use crate::signal::window::{Domain, Window};
 
 use balance::Balance;
 pub use kept::Kept;
+use kept::KeptLevel;
 use level::Level;
 
 /// Channel that holds local contrast; the three before it are the colour.
@@ -174,14 +175,15 @@ pub fn run(
     let balanced = !plan.kept.as_ref().is_some_and(Kept::is_tile);
     let mut balance = Balance::new(if balanced { exemplar.sizes.len() } else { 1 });
     let mut field: Option<Field> = None;
-    let mut kept = None;
+    let mut kept: Option<KeptLevel> = None;
     for (j, level) in levels.iter().enumerate().rev() {
         let (h, w) = level.size;
         let mut f = match field.take() {
             None => Field::random(h, w, &level.source, ctx.seed),
             Some(field) => field.upsampled((h, w), &levels[j + 1].source, &level.source, ctx.seed),
         };
-        kept = plan.kept.as_ref().map(|kept| kept.at_level(level));
+        let coarser = levels.get(j + 1).zip(kept.as_ref());
+        kept = plan.kept.as_ref().map(|kept| kept.at_level(level, coarser, ctx.seed));
         if let Some(kept) = &kept {
             kept.hold(&mut f);
         }
@@ -218,8 +220,8 @@ pub fn run(
             let now = PlaceCost::of_usage(&f, &level.source, plan.uniformity * level.usage_unit);
             usage = now.averaged(&usage);
             let cost = usage.clone().plus(plan.rarity, &level.rarity);
-            let cost = match kept.as_ref().and_then(|kept| kept.former.as_ref()) {
-                Some(former) => cost.plus(1.0, former),
+            let cost = match kept.as_ref().and_then(KeptLevel::cost) {
+                Some(more) => cost.plus(1.0, more),
                 None => cost,
             };
             let search = Search { pass, ..search };
