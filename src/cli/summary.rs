@@ -172,7 +172,7 @@ pub(super) fn line(
 ) -> String {
     let (w, h) = report.tile_size;
     let (photo_w, photo_h) = report.photo_size;
-    let why = if asked.size == Size::Auto {
+    let why = if asked.size == Size::Auto && report.redo.is_none() {
         format!(" (default size for a {photo_w}x{photo_h} photo)")
     } else {
         String::new()

@@ -32,7 +32,8 @@ impl Rect {
     /// Whether pixel (`y`, `x`) of a picture of this size (height, width), which repeats, lies in it.
     #[inline]
     pub fn contains(&self, (y, x): (usize, usize), (height, width): (usize, usize)) -> bool {
-        (y + height - self.y) % height < self.height && (x + width - self.x) % width < self.width
+        let inside = |i: usize, n: usize, start: usize, len: usize| (i + n - start % n) % n < len;
+        inside(y, height, self.y, self.height) && inside(x, width, self.x, self.width)
     }
 
     /// All pixels of a picture of size `to` that show a part of it, if the rectangle is of the same
@@ -48,11 +49,19 @@ impl Rect {
         Self { y, x, height, width }
     }
 
+    /// It without a rim of `by` pixels, or of a quarter of a side that is short.
+    #[must_use]
+    pub fn shrunk(&self, by: usize) -> Self {
+        let (dy, dx) = (by.min(self.height / 4), by.min(self.width / 4));
+        let (height, width) = (self.height - 2 * dy, self.width - 2 * dx);
+        Self { y: self.y + dy, x: self.x + dx, height, width }
+    }
+
     /// It and all pixels at most `by` rows and columns away, on a picture of this size that repeats.
     #[must_use]
     pub fn grown(&self, by: usize, (height, width): (usize, usize)) -> Self {
         let side = |start: usize, len: usize, n: usize| match len + 2 * by {
-            grown if grown < n => ((start + n - by) % n, grown),
+            grown if grown < n => ((start % n + n - by) % n, grown),
             _ => (0, n),
         };
         let (y, height) = side(self.y, self.height, height);
@@ -81,6 +90,13 @@ mod tests {
             assert_eq!(Rect::parse(text), None, "{text}");
         }
         assert_eq!(Rect::parse("1x2+3+99999999999999999999"), None);
+    }
+
+    #[test]
+    fn a_rim_is_taken_off() {
+        let rect = Rect { y: 4, x: 3, height: 20, width: 9 };
+        assert_eq!(rect.shrunk(3), Rect { y: 7, x: 5, height: 14, width: 5 });
+        assert_eq!(rect.shrunk(0), rect);
     }
 
     /// Against marking pixels one by one, on all rectangles of a small picture.

@@ -264,6 +264,16 @@ mod tests {
     }
 
     #[test]
+    fn random_costs_are_those_of_squares() {
+        let source = Source::new(MatchImage::new(150, 130), 11, None).expect("source");
+        let (a, b) = (PlaceCost::random(&source, 1), PlaceCost::random(&source, 2));
+        assert!(a.cost.iter().all(|&cost| (0..=RANDOM_MOST as i32).contains(&cost)));
+        assert_eq!(a.of(Pos::new(23, 34)), a.of(Pos::new(31, 42)), "one square");
+        let near = a.cost.iter().zip(&b.cost).filter(|(a, b)| (*a - *b).abs() < 50).count();
+        assert!(near * 4 < a.cost.len(), "the seeds agree on {near} of {}", a.cost.len());
+    }
+
+    #[test]
     fn free_use_costs_nothing_and_even_use_its_weight() {
         for patch in [3, 5, 7, 11, 15, 21] {
             let side = 130 + patch - 1;

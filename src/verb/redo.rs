@@ -49,8 +49,9 @@ impl Redo<'_> {
         self.check_rect(params)?;
         let sizes = self.of.source_sizes();
         if sizes.len() != photos.len() {
-            let expected = format!("a tile of {} photos, as are given", photos.len());
-            return Err(Error::parameter("redo", expected, format!("one of {}", sizes.len())));
+            let expected = "a rectangle of a tile made of the photos that are given";
+            let got = format!("a tile of {} and {} photos", sizes.len(), photos.len());
+            return Err(Error::parameter("redo", expected, got));
         }
         for (i, (photo, &(want_h, want_w))) in photos.iter().zip(sizes).enumerate() {
             let (got_w, got_h) = (photo.width(), photo.height());
@@ -64,10 +65,10 @@ impl Redo<'_> {
         let named = self.of.origins().unwrap_or_default().iter().map(|origin| origin.symmetry);
         let missing = |symmetry: &Symmetry| !listed.contains(symmetry);
         if let Some(symmetry) = named.into_iter().find(missing) {
+            let mirrored = if symmetry.is_mirrored() { "mirrored and " } else { "" };
+            let turned = u16::from(symmetry.turns()) * 90;
             let expected = format!(
-                "what the tile was made with: it has pixels mirrored {}, turned {}",
-                if symmetry.is_mirrored() { "left to right" } else { "never" },
-                symmetry.turns() * 90
+                "what the tile was made with (it has pixels {mirrored}turned by {turned} degrees)"
             );
             return Err(Error::parameter("symmetry", expected, params.symmetry.show()));
         }

@@ -14,16 +14,16 @@ use crate::search::source::Source;
 use crate::search::vote::Votes;
 use crate::signal::histogram::SOFT_BITS;
 
-/// Cost of a patch that was in a redone rectangle, as a share of a patch's variance. From less the
-/// rectangle's old content comes back, as it fits its surroundings best; more changes nothing, any
-/// other place is cheaper already.
+/// Cost of a patch that was in a redone rectangle, as a share of a patch's variance. Patches of noise
+/// differ by twice the variance: from less the rectangle's old content comes back, as it fits its
+/// surroundings best. More changes nothing, any other place is cheaper already.
 const FORMER_SHARE: f32 = 4.0;
 
 /// What the places of a redone rectangle cost at random, at most, as a share of a patch's variance:
 /// the minimum of a randomly perturbed energy is a sample (Papandreou and Yuille 2011,
 /// Perturb-and-MAP). From less most seeds find the same best filling of a small rectangle; more
 /// chooses places that fit badly.
-const RANDOM_SHARE: f32 = 0.5;
+const RANDOM_SHARE: f32 = 0.1;
 
 /// Output pixels that are copies of given pixels of the photos.
 #[derive(Debug, Clone)]
@@ -93,14 +93,15 @@ impl Kept {
         let (full, size @ (h, w)) = ((self.map.height(), self.map.width()), level.size);
         let source = &level.source;
         let half = source.patch / 2;
-        // The patches around a redone rectangle show what was in it: they are left to the search.
-        let (free, loose) = match &self.part {
+        // A rim of a redone rectangle may stay as it was, so that the seam has room. The patches that
+        // show more of it than the rim are left to the search.
+        let (free, inner) = match &self.part {
             Part::Flagged(_) => (None, None),
             Part::Outside(rect) => {
-                let free = rect.scaled(full, size);
-                (Some(free), Some(free.grown(half, size)))
+                (Some(rect.scaled(full, size)), Some(rect.shrunk(half).scaled(full, size)))
             }
         };
+        let loose = inner.map(|inner| inner.grown(half, size));
         let mut of_level =
             KeptLevel { width: w, pixels: Vec::new(), held: Vec::new(), costs: None };
         let mut former = Vec::new();
@@ -122,7 +123,7 @@ impl Kept {
                 if source.is_usable(pos) && !loose.is_some_and(|l| l.contains((y, x), size)) {
                     of_level.held.push((i as u32, pos));
                 }
-            } else if free.is_some() {
+            } else if inner.is_some_and(|inner| inner.contains((y, x), size)) {
                 // Mirrored or turned it would be the same again.
                 let views = source.atlas.views().iter().filter(|view| view.picture == photo);
                 former.extend(views.map(|view| {
