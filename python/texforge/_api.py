@@ -61,6 +61,8 @@ def tile(
     mask: ImageLike | None = None,
     avoid: ImageLike | None = None,
     sigma_map: ImageLike | None = None,
+    redo: tuple[int, int, int, int] | None = None,
+    redo_of: Tile | SourceMap | npt.ArrayLike | None = None,
     maps: Mapping[str, ImageLike | Sequence[ImageLike]] | None = None,
     encoding: Encoding | Literal["auto"] = "auto",
     threads: int | None = None,
@@ -140,6 +142,18 @@ def tile(
         Sigma at every pixel of the tile (and of its size), in place of `sigma`. Floats are sigma
         itself, 0.01 to 1. Of integers black is 0.01, half of full scale 0.1 and white 1, in even
         factors. ``costs.stationarity`` is measured with `sigma` still.
+    redo : (int, int, int, int), optional
+        **(y, x, height, width)** of a rectangle of the tile `redo_of` in pixels: only that is
+        made anew, and grows out of the rest, which stays as it is, pixel for pixel. It may reach
+        over the bottom and the right edge if the tile repeats there, and must leave a patch's
+        side of rows or columns. What was in it is not to come back, even with the same `seed`,
+        but for a rim of half a patch, where the new joins the old; other seeds make other
+        choices (`tile_variants` makes several).
+    redo_of : Tile, SourceMap or (H', W', 2) array_like of int, optional
+        The tile, or its source map, for `redo`. The photos must be those that it was made of, in
+        their order; `symmetry` must have all that it uses, and `flatten` must be the tile's for
+        its pixels to stay the same. `size` is the tile's. `mask` and `avoid` say what may come
+        in, and change nothing outside of the rectangle.
     maps : mapping of str to array_like, optional
         Other maps of the same material by name, to be tiled the same way. The name decides what
         a map is: base colour and emission are colours, normals are vectors (turned with the photo
@@ -201,6 +215,11 @@ def tile(
     >>> y, x = tile.source_map[..., 0], tile.source_map[..., 1]
     >>> bool(np.all(tile.image == photo[y, x]))
     True
+    >>> other = texforge.tile(photo, redo=(4, 30, 12, 24), redo_of=tile)
+    >>> changed = np.any(other.image != tile.image, axis=2)
+    >>> rows, columns = np.nonzero(changed)  # over the right edge: 30 to 47, and 0 to 5
+    >>> set(columns) <= {*range(30, 48), *range(6)} and set(rows) <= {*range(4, 16)}
+    True
     """
     arguments = locals()
     (made,), _ = tiles(1, as_palette=False, **arguments)
@@ -258,6 +277,8 @@ def tiles(
     mask: ImageLike | None,
     avoid: ImageLike | None,
     sigma_map: ImageLike | None,
+    redo: tuple[int, int, int, int] | None,
+    redo_of: Tile | SourceMap | npt.ArrayLike | None,
     maps: Mapping[str, ImageLike | Sequence[ImageLike]] | None,
     encoding: Encoding | Literal["auto"],
     threads: int | None,
@@ -291,6 +312,7 @@ def tiles(
             sigma_map=None
             if sigma_map is None
             else _arrays.picture(sigma_map, "the sigma map", "data").packed(),
+            redo=_redone(redo, redo_of, photo),
             maps=[
                 (name, [other.packed() for other in all_of_it], kinds[name])
                 for name, all_of_it in others.items()
@@ -524,6 +546,8 @@ def save_tile(tile: Tile, path: PathType, *, overwrite: bool) -> None:
         "seed": tile.seed,
         "params": params,
     }
+    if "redo" in tile.report:
+        made["redo"] = tile.report["redo"]
     _texforge.write(
         path=_arrays.path(path),
         picture=_arrays.picture(tile.image, "the tile", tile.encoding).packed(),
@@ -561,6 +585,27 @@ def _source_map_of(tile: Tile) -> SourceMap:
             fields={"name": "source_map"},
         )
     return SourceMap(tile.source_map, tile.photo_size, tile.also_sizes, tile.origins)
+
+
+def _redone(redo: object, redo_of: Any, photo: _arrays.Picture) -> Any:
+    """Return the tile to redo and the rectangle as the parts that the core takes."""
+    if (redo is None) != (redo_of is None):
+        name, other = ("redo", "redo_of") if redo_of is None else ("redo_of", "redo")
+        raise ParameterError(
+            f"`{name}` must be given together with `{other}`, got it alone", fields={"name": name}
+        )
+    if redo is None:
+        return None
+    if not isinstance(redo, tuple | list) or len(redo) != 4:
+        raise ParameterError(
+            f"`redo` must be (y, x, height, width), got {redo!r}", fields={"name": "redo"}
+        )
+    if isinstance(redo_of, Tile):
+        redo_of = _source_map_of(redo_of)
+    if not isinstance(redo_of, SourceMap):
+        size = (photo.array.shape[0], photo.array.shape[1])
+        redo_of = SourceMap(_arrays.positions(redo_of), size)
+    return _arrays.packed_map(redo_of), [_arrays.integer("redo", side, 0, 2**31) for side in redo]
 
 
 def _maps(images: Any, name: object, further: int) -> list[_arrays.Picture]:

@@ -39,6 +39,7 @@ def tiles(
     mask: _Picture | None,
     avoid: _Picture | None,
     sigma_map: _Picture | None,
+    redo: tuple[_Map, list[int]] | None,
     maps: list[tuple[str, list[_Picture], str]],
     params: list[tuple[str, str]],
     seed: int,

@@ -104,6 +104,8 @@ class TileOptions(TypedDict, total=False):
     mask: ImageLike | None
     avoid: ImageLike | None
     sigma_map: ImageLike | None
+    redo: tuple[int, int, int, int] | None
+    redo_of: Tile | SourceMap | npt.ArrayLike | None
     maps: Mapping[str, ImageLike | Sequence[ImageLike]] | None
     encoding: Encoding | Literal["auto"]
     threads: int | None

@@ -23,6 +23,7 @@ Examples:
   texforge tile wall.jpg -o wall.png --stationarity 0.7
   texforge tile meadow.jpg -o meadow.png --flatten 0.2 --variants 4
   texforge tile grass_a.jpg --also grass_b.jpg --symmetry all -o grass.png
+  texforge tile brick.jpg -o better.png --redo 120x80+430+16 --redo-of brick_source.exr
   texforge tile brick.jpg -o - | display";
 
 const APPLY_EXAMPLES: &str = "\
@@ -125,6 +126,7 @@ fn tile() -> Command {
                     maps::known_names()
                 )),
         )
+        .args(redo())
         .arg(switch("no-maps", "Leave alone the maps that lie beside the photo"))
         .next_help_heading("Outputs")
         .arg(
@@ -168,6 +170,25 @@ pub(super) fn running() -> [Arg; 2] {
             .value_parser(value_parser!(usize))
             .allow_negative_numbers(true)
             .help("Worker threads, 0 for one per core; changes the speed, never the result"),
+    ]
+}
+
+/// What makes one rectangle of a tile anew.
+fn redo() -> [Arg; 2] {
+    [
+        Arg::new("redo")
+            .long("redo")
+            .value_name("WxH+X+Y")
+            .requires("redo-of")
+            .help(
+                "Make only this rectangle of a finished tile anew, W pixels wide and H high, X from the left and Y \
+                 from the top; it may reach over an edge that repeats. What was in it is not to come back; another \
+                 --seed gives another choice, --variants several. All else stays as it is, pixel for pixel",
+            ),
+        file("redo-of", "FILE.exr", "Source map of that tile, written by --save-source-map; give the photos, --symmetry \
+             and --flatten that the tile was made with")
+            .long("redo-of")
+            .requires("redo"),
     ]
 }
 

@@ -11,6 +11,7 @@ use crate::base::params::Value as _;
 use crate::cli::output::Target;
 use crate::cli::show::duration;
 use crate::cli::small::{SCHEMA_VERSION, typed};
+use crate::image::rect::Rect;
 use crate::verb::params::{Measure, Size, TileParams};
 use crate::verb::tile::{Costs, Report};
 
@@ -42,6 +43,9 @@ pub(super) struct Summary {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     also: Vec<Written>,
     tile: Written,
+    /// The rectangle that was made anew.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    redo: Option<Rect>,
     costs: Costs,
     seconds: Seconds,
     /// All tiles, the first as well, if there are several.
@@ -97,14 +101,17 @@ impl Written {
 
 /// How the tile was made, for the file itself. Holds nothing that differs between equal runs.
 pub(super) fn record(report: &Report) -> String {
-    serde_json::json!({
+    let mut record = serde_json::json!({
         "tool": "texforge",
         "version": report.version,
         "verb": TileParams::VERB,
         "seed": report.seed,
         "params": params(report),
-    })
-    .to_string()
+    });
+    if let Some(rect) = report.redo {
+        record["redo"] = serde_json::json!(rect);
+    }
+    record.to_string()
 }
 
 fn params(report: &Report) -> BTreeMap<&'static str, serde_json::Value> {
@@ -151,6 +158,7 @@ pub(super) fn summary(
         photo: photo((&photos[0], &report.photo_size)),
         also: photos[1..].iter().zip(&report.also_sizes).map(photo).collect(),
         tile: first.tile,
+        redo: report.redo,
         costs: first.costs,
         seconds: Seconds { stages: first.seconds, total: elapsed.as_secs_f64() },
         variants,
@@ -168,7 +176,7 @@ pub(super) fn line(
 ) -> String {
     let (w, h) = report.tile_size;
     let (photo_w, photo_h) = report.photo_size;
-    let why = if asked.size == Size::Auto {
+    let why = if asked.size == Size::Auto && report.redo.is_none() {
         format!(" (default size for a {photo_w}x{photo_h} photo)")
     } else {
         String::new()

@@ -16,9 +16,11 @@ use crate::cli::work::{Session, supervise, watch_signals};
 use crate::cli::{args, files};
 use crate::image::material::{MapKind, Sibling};
 use crate::image::picture::Picture;
+use crate::image::rect::Rect;
 use crate::image::sheet;
 use crate::verb::inputs::Inputs;
 use crate::verb::params::{Method, TileParams};
+use crate::verb::redo::Redo;
 use crate::verb::tile::{Tile, tiles};
 
 /// Longest side of a preview in pixels; what a screen shows at once.
@@ -31,6 +33,8 @@ struct Request {
     /// Where each tile goes.
     places: Vec<Place>,
     params: TileParams,
+    /// The rectangle to make anew, and the tile's source map.
+    redo: Option<(Rect, PathBuf)>,
     maps: Vec<Wanted>,
     pick_up: bool,
     force: bool,
@@ -77,6 +81,11 @@ impl Request {
         let maps = matches.get_many::<OsString>("map").into_iter().flatten();
         let maps = maps::typed(maps, sources.photos.len())?;
         let source_map = path("save-source-map");
+        let rect = matches.get_one::<String>("redo").map(|text| {
+            let expected = "a rectangle as WIDTHxHEIGHT+X+Y";
+            Rect::parse(text).ok_or_else(|| Error::parameter("redo", expected, format!("`{text}`")))
+        });
+        let rect = rect.transpose()?;
         let wants = |flag| matches.get_flag(flag);
         let count = matches.get_one::<usize>("variants").copied().unwrap_or(1);
         // Name what contradicts what, before any file is touched.
@@ -103,14 +112,16 @@ impl Request {
                 && params.method != Method::MakeSeamless,
             places: places(&target, source_map.as_deref(), wants("preview"), count),
             params,
+            redo: rect.zip(path("redo-of")),
             maps,
             force: wants("force"),
         })
     }
 
     fn inputs(&self) -> Vec<&Path> {
-        let maps = self.maps.iter().flat_map(|m| &m.paths).map(PathBuf::as_path);
-        maps.chain(self.sources.paths()).collect()
+        let maps = self.maps.iter().flat_map(|m| &m.paths);
+        let of = self.redo.as_ref().map(|(_, map)| map);
+        maps.chain(of).map(PathBuf::as_path).chain(self.sources.paths()).collect()
     }
 
     /// Fails if an output cannot be written, or two outputs are the same file.
@@ -169,7 +180,12 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Vec
 
     let mut pictures = request.sources.read(session)?;
     let mut notes = std::mem::take(&mut pictures.notes);
-    let (photo, inputs) = (&pictures.photo, pictures.inputs());
+    let redone = match &request.redo {
+        None => None,
+        Some((rect, path)) => Some((*rect, files::read_source_map(path)?)),
+    };
+    let redo = redone.as_ref().map(|(rect, of)| Redo { of, rect: *rect });
+    let (photo, inputs) = (&pictures.photo, Inputs { redo, ..pictures.inputs() });
     let maps = read_maps(session, request, &inputs, &mut notes)?;
     request.check_outputs(&maps)?;
     files::ensure_can_hold(photo, request.places[0].tile.file(), MapKind::Color)?;

@@ -6,6 +6,7 @@ pub mod mask;
 pub mod material;
 pub mod normals;
 pub mod picture;
+pub mod rect;
 pub mod sheet;
 pub mod sigma_map;
 pub mod sourcemap;

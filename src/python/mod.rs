@@ -22,9 +22,11 @@ use crate::image::io::{self, Format, WriteOptions};
 use crate::image::mask::Mask;
 use crate::image::material::{self, MapKind};
 use crate::image::picture::Picture;
+use crate::image::rect::Rect;
 use crate::image::sigma_map::SigmaMap;
 use crate::verb::inputs::Inputs;
 use crate::verb::params::TileParams;
+use crate::verb::redo::Redo;
 use crate::verb::texture_cost as measure;
 use crate::verb::texture_cost::TextureCostParams;
 use crate::verb::tile::{Step, Tile};
@@ -55,7 +57,7 @@ type PaletteOut<'py> = (Vec<f64>, Vec<(f64, f64)>, ArrayOut<'py>);
     clippy::too_many_arguments,
     reason = "one private caller, in _api.py, passes them by name"
 )]
-#[pyo3(signature = (*, photo, also, mask, avoid, sigma_map, maps, params, seed, count, as_palette, threads, progress, trace))]
+#[pyo3(signature = (*, photo, also, mask, avoid, sigma_map, redo, maps, params, seed, count, as_palette, threads, progress, trace))]
 fn tiles<'py>(
     py: Python<'py>,
     photo: ArrayIn<'py>,
@@ -63,6 +65,7 @@ fn tiles<'py>(
     mask: Option<ArrayIn<'py>>,
     avoid: Option<ArrayIn<'py>>,
     sigma_map: Option<ArrayIn<'py>>,
+    redo: Option<(MapIn<'py>, [usize; 4])>,
     maps: Vec<NamedMap<'py>>,
     params: Vec<(String, String)>,
     seed: u64,
@@ -87,6 +90,12 @@ fn tiles<'py>(
         Some(map) => Some(SigmaMap::from_picture(&map.picture(py)?).into_py(py)?),
         None => None,
     };
+    let redone = match redo {
+        Some((map, [y, x, height, width])) => {
+            Some((map.source_map(py)?, Rect { y, x, height, width }))
+        }
+        None => None,
+    };
     let mut others = Vec::with_capacity(maps.len());
     for (name, maps, kind) in &maps {
         let (maps, kind) = (pictures(maps)?, kind_named(kind).into_py(py)?);
@@ -104,6 +113,7 @@ fn tiles<'py>(
             avoid: avoid.as_ref(),
             sigma_map: sigma_map.as_ref(),
             trace,
+            redo: redone.as_ref().map(|(of, rect)| Redo { of, rect: *rect }),
             ..Inputs::new(&photo)
         };
         let gather = |tile: Tile| {

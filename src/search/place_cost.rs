@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use crate::base::rng::Rng;
 use crate::search::field::{Field, Pos};
 use crate::search::source::Source;
 
@@ -10,6 +11,9 @@ const MOST: f32 = (1 << 28) as f32;
 
 /// Marks the cells that a cost says nothing about.
 pub(crate) const ELSEWHERE: i32 = -1;
+
+/// The largest of [`PlaceCost::random`].
+pub const RANDOM_MOST: u32 = 1 << 10;
 
 /// What it costs to copy from each place of a source, besides how well it fits: on a grid of cells
 /// of a third of a patch, in squared codes.
@@ -26,6 +30,19 @@ impl PlaceCost {
         let shift = cell_shift(source.patch);
         let cols = (source.cols() >> shift) + 1;
         Self { cols, shift, cost: vec![0; cols * ((source.rows() >> shift) + 1)] }
+    }
+
+    /// Costs drawn at random from 0 to [`RANDOM_MOST`], one for every square of the patch's side.
+    ///
+    /// # Determinism
+    /// Depends on `seed` and the source's size alone.
+    pub fn random(source: &Source, seed: u64) -> Self {
+        const STAGE: u32 = 7;
+        let per_row = source.cols().div_ceil(source.patch);
+        Self::of_each(source, |pos| {
+            let square = pos.y() / source.patch * per_row + pos.x() / source.patch;
+            Rng::new(seed, STAGE, 0, square as u64).below(RANDOM_MOST + 1) as i32
+        })
     }
 
     /// Spatial uniformity (Kaspar et al. 2015): the cost of using each source patch once more, `weight * occurrence / w_best`, where the
@@ -193,7 +210,6 @@ fn cell_shift(patch: usize) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::rng::Rng;
     use crate::search::patch::MatchImage;
 
     /// Occurrence by its definition: how many matched patches cover each pixel, averaged over the
@@ -245,6 +261,16 @@ mod tests {
             let worst = ratios.iter().map(|r| (r / mean - 1.0).abs()).fold(0.0, f64::max);
             assert!(worst < 0.3, "patch {patch}: {worst:.3} off at worst");
         }
+    }
+
+    #[test]
+    fn random_costs_are_those_of_squares() {
+        let source = Source::new(MatchImage::new(150, 130), 11, None).expect("source");
+        let (a, b) = (PlaceCost::random(&source, 1), PlaceCost::random(&source, 2));
+        assert!(a.cost.iter().all(|&cost| (0..=RANDOM_MOST as i32).contains(&cost)));
+        assert_eq!(a.of(Pos::new(23, 34)), a.of(Pos::new(31, 42)), "one square");
+        let near = a.cost.iter().zip(&b.cost).filter(|(a, b)| (*a - *b).abs() < 50).count();
+        assert!(near * 4 < a.cost.len(), "the seeds agree on {near} of {}", a.cost.len());
     }
 
     #[test]

@@ -8,6 +8,7 @@ use crate::image::sigma_map::SigmaMap;
 use crate::image::sourcemap::{Origin, SourceMap};
 use crate::method::flatten::{self, Flat};
 use crate::verb::params::TileParams;
+use crate::verb::redo::Redo;
 
 /// What a tile is made from.
 #[derive(Debug, Clone, Copy)]
@@ -29,12 +30,22 @@ pub struct Inputs<'a> {
     /// Whether every iteration's costs are measured too, see [`Tile::trace`](crate::Tile::trace). The
     /// same bytes; the time it takes is listed apart in the report.
     pub trace: bool,
+    /// Makes one rectangle of a finished tile of these photos anew, instead of a whole tile.
+    pub redo: Option<Redo<'a>>,
 }
 
 impl<'a> Inputs<'a> {
     /// A photo alone.
     pub fn new(photo: &'a Picture) -> Self {
-        Self { photo, also: &[], mask: None, avoid: None, sigma_map: None, trace: false }
+        Self {
+            photo,
+            also: &[],
+            mask: None,
+            avoid: None,
+            sigma_map: None,
+            trace: false,
+            redo: None,
+        }
     }
 
     /// All photos, in their order: as they are, or `flat` in their place.

@@ -75,7 +75,10 @@ impl<'a> Maker<'a> {
         if params.band > 0 {
             let photo = (inputs.photo.height(), inputs.photo.width());
             let usable = masks[0].as_ref().map(Mask::usable);
-            plan.kept = Some(Kept::middle(photo, usable, (height, width), params.band, wrap));
+            plan.kept = Some(Kept::middle(photo, usable, (height, width), params.band, wrap)?);
+        }
+        if let Some(redo) = &inputs.redo {
+            plan.kept = Some(Kept::outside(redo.of.clone(), redo.rect));
         }
         let (flat, exemplar) = ctx.install(|| {
             let flat = inputs.flattened(&masks, params, &mut notes)?;
@@ -171,6 +174,7 @@ impl<'a> Maker<'a> {
             photo_size: (photos[0].width(), photos[0].height()),
             also_sizes: photos[1..].iter().map(|p| (p.width(), p.height())).collect(),
             tile_size: self.size,
+            redo: self.inputs.redo.map(|redo| redo.rect),
             costs,
             seconds: self.seconds.iter().copied().chain(own.into_iter().flatten()).collect(),
             notes: self.notes.clone(),
@@ -209,7 +213,10 @@ fn check(inputs: &Inputs<'_>, params: &TileParams, count: usize) -> Result<(usiz
         return Err(Error::parameter("order", expected, params.order));
     }
     let photo = inputs.photo;
-    let (width, height) = params.resolved_size(photo.width(), photo.height());
+    let (width, height) = match &inputs.redo {
+        Some(redo) => redo.tile_size(params)?,
+        None => params.resolved_size(photo.width(), photo.height()),
+    };
     let sides = 1..=MAX_TILE_SIDE;
     if !sides.contains(&width) || !sides.contains(&height) {
         let expected = format!("1x1 to {MAX_TILE_SIDE}x{MAX_TILE_SIDE} pixels");
@@ -240,6 +247,9 @@ fn check(inputs: &Inputs<'_>, params: &TileParams, count: usize) -> Result<(usiz
         check_band(params, (pw, ph), (width, height))?;
     }
     let photos = inputs.photos(None);
+    if let Some(redo) = &inputs.redo {
+        redo.check(&photos, params)?;
+    }
     for (i, photo) in photos.iter().enumerate() {
         let what = if i == 0 { "the photo".to_owned() } else { format!("photo {}", i + 1) };
         let (pw, ph) = (photo.width(), photo.height());
@@ -264,7 +274,9 @@ fn check(inputs: &Inputs<'_>, params: &TileParams, count: usize) -> Result<(usiz
     // A filtered channel is eleven planes of floats; a sigma map has up to eight planes of weights.
     let filtered = if params.measure == Measure::Steerable { 44 } else { 0 };
     let mapped = if inputs.sigma_map.is_some() { 48 } else { 0 };
-    let measured = (width * height) as u64 * (filtered + mapped);
+    // What is kept: the source map (12), and at a level its pixels and patches (20).
+    let kept = if inputs.redo.is_some() { 32 } else { 0 };
+    let measured = (width * height) as u64 * (filtered + mapped + kept);
     // Every tile with its source map stays until the last is made; flattened photos are copies.
     let tile = (width * height) as u64 * (photo.byte_len() / (pw * ph)) as u64;
     let others = (tile + 12 * (width * height) as u64).checked_mul(count as u64 - 1);

@@ -4,5 +4,6 @@ pub mod inputs;
 mod maker;
 pub mod palette;
 pub mod params;
+pub mod redo;
 pub mod texture_cost;
 pub mod tile;

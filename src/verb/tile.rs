@@ -6,6 +6,7 @@ use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
 use crate::image::mask::Mask;
 use crate::image::picture::Picture;
+use crate::image::rect::Rect;
 use crate::image::sourcemap::SourceMap;
 use crate::verb::inputs::Inputs;
 use crate::verb::maker::Maker;
@@ -57,6 +58,9 @@ pub struct Report {
     pub tile_size: (usize, usize),
     /// The costs.
     pub costs: Costs,
+    /// The rectangle that was made anew, if the rest of the tile was given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub redo: Option<Rect>,
     /// Wall time in seconds of each stage, in order; `analysis` of the photo and `dial` are shared by
     /// the tiles of a run. The only part that differs between runs.
     pub seconds: Vec<(&'static str, f64)>,

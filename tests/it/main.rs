@@ -9,6 +9,7 @@ mod io;
 mod measures;
 mod options;
 mod quality;
+mod redo;
 mod search;
 #[path = "../support/mod.rs"]
 mod support;

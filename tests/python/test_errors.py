@@ -103,6 +103,12 @@ PARAMETERS: dict[str, dict[str, Any]] = {
     "encoding": {"encoding": "gamma"},
     "progress": {"progress": 3},
     "order as text": {"measure": "moments", "order": "2"},
+    "redo of nothing": {"redo": (0, 0, 4, 4)},
+    "nothing of a tile redone": {"redo_of": np.zeros((24, 32, 2), int)},
+    "redo of three": {"redo": (0, 0, 4), "redo_of": np.zeros((24, 32, 2), int)},
+    "redo outside": {"redo": (24, 0, 4, 4), "redo_of": np.zeros((24, 32, 2), int)},
+    "redo of no pixel": {"redo": (0, 0, 0, 4), "redo_of": np.zeros((24, 32, 2), int)},
+    "redo of all": {"redo": (0, 0, 24, 32), "redo_of": np.zeros((24, 32, 2), int)},
     "map's name": {"maps": {3: noise()}},
     "maps with nothing to follow": {
         "maps": {"height": noise()},

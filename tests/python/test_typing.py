@@ -31,6 +31,7 @@ def test_a_tile_from_everything(tmp_path: Path) -> None:
     with tqdm(total=1.0, disable=True) as bar:
         texforge.tile(photo, size=24, patch=5, progress=bar)
     assert_type(texforge.tile_variants(photo, 2, size=24, patch=5), list[texforge.Tile])
+    assert_type(texforge.tile(photo, redo=(0, 0, 8, 8), redo_of=tile, patch=5), texforge.Tile)
     tile.save(tmp_path / "tile.png")
     tile.save_source_map(str(tmp_path / "map.exr"))
     assert_type(texforge.read_image(tmp_path / "tile.png"), texforge.Image)

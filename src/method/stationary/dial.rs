@@ -165,7 +165,7 @@ fn tried(
     let look = |(sigma, seed): (f64, u64)| {
         let evenness = plan.evenness.clone().map(|e| Evenness { sigma: sigma as f32, ..e });
         let plan = Plan { evenness, ..trial(plan) };
-        let field = synthesize(&ctx.with_seed(seed), exemplar, &plan, finest, None)?;
+        let (field, _) = synthesize(&ctx.with_seed(seed), exemplar, &plan, finest, None)?;
         let level = &exemplar.levels[finest];
         let color = |[y, x]: [u32; 2]| {
             let [l, a, b, _] = level.source.image.pixel(y as usize, x as usize);

@@ -32,6 +32,7 @@ use crate::signal::window::{Domain, Window};
 use balance::Balance;
 pub use dial::{Dial, SIGMAS};
 pub use kept::Kept;
+use kept::KeptLevel;
 use level::Level;
 
 /// Channel that holds local contrast; the three before it are the colour.
@@ -180,11 +181,10 @@ pub fn run(
     plan: &Plan,
     mut watch: Option<Watch<'_>>,
 ) -> Result<SourceMap> {
-    let field = synthesize(ctx, exemplar, plan, 0, watch.as_mut())?;
+    let (field, kept) = synthesize(ctx, exemplar, plan, 0, watch.as_mut())?;
     let finest = &exemplar.levels[0];
     let mut yx = centers(&field, plan.patch);
     let mut votes = vote(ctx.simd, &field, &finest.source, plan.wrap);
-    let kept = plan.kept.as_ref().map(|kept| kept.at_level(plan.size, &finest.source));
     if let Some(kept) = &kept {
         kept.restore(&mut votes, &finest.source, plan.wrap);
     }
@@ -207,28 +207,31 @@ pub fn run(
 }
 
 /// Goes through the levels from the coarsest down to number `finest`: where every pixel's patch is
-/// matched there.
+/// matched there, and what is kept.
 fn synthesize(
     ctx: &Ctx,
     exemplar: &Exemplar,
     plan: &Plan,
     finest: usize,
     mut watch: Option<&mut Watch<'_>>,
-) -> Result<Field> {
+) -> Result<(Field, Option<KeptLevel>)> {
     let levels = &exemplar.levels;
     let n_coarse = levels.len() - 1;
     let mut pass = 0;
-    let mut balance = Balance::new(exemplar.sizes.len());
+    let balanced = !plan.kept.as_ref().is_some_and(Kept::is_tile);
+    let mut balance = Balance::new(if balanced { exemplar.sizes.len() } else { 1 });
     let mut field: Option<Field> = None;
+    let mut kept: Option<KeptLevel> = None;
     for (j, level) in levels.iter().enumerate().skip(finest).rev() {
         let (h, w) = level.size;
         let mut f = match field.take() {
             None => Field::random(h, w, &level.source, ctx.seed),
             Some(field) => field.upsampled((h, w), &levels[j + 1].source, &level.source, ctx.seed),
         };
-        let kept = plan.kept.as_ref().map(|kept| kept.at_level((h, w), &level.source));
+        let coarser = levels.get(j + 1).zip(kept.as_ref());
+        kept = plan.kept.as_ref().map(|kept| kept.at_level(level, coarser, ctx.seed));
         if let Some(kept) = &kept {
-            kept.hold(&mut f, &level.source);
+            kept.hold(&mut f);
         }
         let coarsest = j == n_coarse;
         let mut usage = PlaceCost::of_usage(&f, &level.source, plan.uniformity * level.usage_unit);
@@ -263,6 +266,10 @@ fn synthesize(
             let now = PlaceCost::of_usage(&f, &level.source, plan.uniformity * level.usage_unit);
             usage = now.averaged(&usage);
             let cost = usage.clone().plus(plan.rarity, &level.rarity);
+            let cost = match kept.as_ref().and_then(KeptLevel::cost) {
+                Some(more) => cost.plus(1.0, more),
+                None => cost,
+            };
             let search = Search { pass, ..search };
             let unit = f64::from(plan.uniformity) * level.patch_variance;
             let cost = match balance.costs(&f, &level.source, &areas, unit) {
@@ -271,7 +278,7 @@ fn synthesize(
             };
             patchmatch::pass(ctx, &target, &level.source, &cost, plan.wrap, search, &mut f)?;
             if let Some(kept) = &kept {
-                kept.hold(&mut f, &level.source);
+                kept.hold(&mut f);
             }
             pass += 1;
             if let Some(watch) = watch.as_mut() {
@@ -282,7 +289,7 @@ fn synthesize(
         }
         field = Some(f);
     }
-    Ok(field.expect("there is at least one level"))
+    Ok((field.expect("there is at least one level"), kept))
 }
 
 /// The pixel in the middle of each matched patch.
