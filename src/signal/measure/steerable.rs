@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use crate::signal::histogram::{SOFT_BITS, Soft, rounded};
 use crate::signal::measure::histogram::{mapping, plane_cost};
 use crate::signal::measure::{project_channels, wanted};
-use crate::signal::steerable::Pyramid;
+use crate::signal::steerable::{rebuilt, responses};
 use crate::signal::window::{Domain, Window};
 
 /// Colour channels. The fourth, local contrast, is such a response itself (of all directions
@@ -18,13 +18,12 @@ const ZERO: u16 = 63 << SOFT_BITS;
 
 /// Earth mover's distance between the histograms of two places, summed over the twelve responses.
 pub(super) fn cost(pixels: &[[f32; 3]], domain: Domain, window: &Window) -> f64 {
-    let responses = |k: usize| {
+    let of_channel = |k: usize| {
         let plane: Vec<f32> = pixels.iter().map(|px| px[k]).collect();
-        let pyramid = Pyramid::of(&plane, domain);
         let cost = |band: &Vec<f32>| plane_cost(|i| band[i], band.len(), domain, window);
-        pyramid.bands.iter().map(cost).sum::<f64>()
+        responses(&plane, domain).iter().map(cost).sum::<f64>()
     };
-    (0..COLORS).map(responses).sum()
+    (0..COLORS).map(of_channel).sum()
 }
 
 /// Each response moves towards one whose local histogram is the same everywhere; the picture is put
@@ -39,29 +38,27 @@ pub(super) fn project(pixels: &mut [Soft], domain: Domain, window: &Window, shar
             continue;
         }
         let plane: Vec<f32> = pixels.iter().map(|px| f32::from(px[k])).collect();
-        let mut pyramid = Pyramid::of(&plane, domain);
-        for band in &mut pyramid.bands {
-            project_response(band, domain, window, share);
-        }
-        let picture = pyramid.picture();
+        let changes = responses(&plane, domain).map(|mut band| {
+            turn_into_change(&mut band, domain, window, share);
+            band
+        });
+        let picture = rebuilt(&plane, &changes, domain);
         pixels.par_iter_mut().zip(picture).for_each(|(px, v)| px[k] = rounded(v));
     }
 }
 
-fn project_response(band: &mut [f32], domain: Domain, window: &Window, share: f32) {
+/// Replaces a response by what it has to change so that it is the same everywhere.
+fn turn_into_change(band: &mut [f32], domain: Domain, window: &Window, share: f32) {
     let most = band.iter().fold(0f32, |most, v| most.max(v.abs()));
     if most <= 0.0 {
         return;
     }
     let scale = f32::from(ZERO) / most;
-    let code = |v: f32| rounded(f32::from(ZERO) + v * scale);
-    let even = wanted(
-        |i| code(band[i]),
-        domain,
-        window,
-        |sigma| mapping(|i| code(band[i]), domain, sigma),
-    );
-    band.par_iter_mut().zip(even).for_each(|(v, even)| {
-        *v += share * (even - f32::from(code(*v))) / scale;
+    let codes: Vec<u16> = band.par_iter().map(|v| rounded(f32::from(ZERO) + v * scale)).collect();
+    let code = |i: usize| codes[i];
+    let even = wanted(code, domain, window, |sigma| mapping(code, domain, sigma));
+    let share = share / scale;
+    band.par_iter_mut().zip(even).zip(&codes).for_each(|((v, even), &code)| {
+        *v = share * (even - f32::from(code));
     });
 }
