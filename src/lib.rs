@@ -34,6 +34,8 @@ pub use image::sigma_map::SigmaMap;
 pub use image::sourcemap::{Origin, SourceMap};
 pub use image::symmetry::Symmetry;
 pub use verb::inputs::Inputs;
+pub use analyze::lattice::snap::Snap;
+pub use verb::lattice::{Lattice, LatticeParams, detect_lattice, lattice_autocorrelation};
 pub use verb::params::{Axis, Measure, Method, Quality, Size, Symmetries, TileParams};
 pub use verb::texture_cost::{TextureCost, TextureCostParams, texture_cost};
 pub use verb::tile::{Costs, Report, Step, Tile, tile, tiles};

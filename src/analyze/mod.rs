@@ -1,5 +1,6 @@
 //! Room 4: numbers about one picture.
 
+pub mod lattice;
 pub mod nearest;
 pub mod stationarity;
 pub mod texture;

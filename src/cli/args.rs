@@ -9,6 +9,7 @@ use crate::base::error::Result;
 use crate::base::params::{Param, Value as _};
 use crate::cli::{maps, study};
 use crate::image::material::MapKind;
+use crate::verb::lattice::LatticeParams;
 use crate::verb::params::TileParams;
 use crate::verb::tile::MAX_VARIANTS;
 
@@ -30,6 +31,13 @@ Examples:
   texforge apply brick_source.exr photo_wetness.png -o brick_wetness.png --kind data
   texforge apply grass_source.exr a_normal_gl.png --also b_normal_gl.png -o grass_normal_gl.png";
 
+const LATTICE_EXAMPLES: &str = "\
+Examples:
+  texforge lattice bricks.jpg
+  texforge lattice bricks.jpg --overlay lattice.png
+  texforge lattice bricks.jpg --json
+  texforge lattice tablecloth.jpg --min-period 30";
+
 /// The whole command line.
 pub(super) fn command() -> Command {
     Command::new("texforge")
@@ -47,6 +55,7 @@ pub(super) fn command() -> Command {
         .arg_required_else_help(true)
         .subcommand(tile())
         .subcommand(apply())
+        .subcommand(lattice())
         .subcommand(study::command())
         .subcommand(
             Command::new("params")
@@ -84,7 +93,7 @@ pub(super) fn command() -> Command {
                 .arg(
                     Arg::new("verb")
                         .value_name("COMMAND")
-                        .value_parser(["tile", "apply", "study", "params", "info", "completions"])
+                        .value_parser(["tile", "apply", "lattice", "study", "params", "info", "completions"])
                         .help("The page of this command"),
                 ),
         )
@@ -169,15 +178,7 @@ fn tile() -> Command {
                 .allow_negative_numbers(true)
                 .help("Seed of all random choices; the same seed gives the same pixels on any machine"),
         )
-        .arg(
-            Arg::new("threads")
-                .long("threads")
-                .value_name("N")
-                .default_value("0")
-                .value_parser(value_parser!(usize))
-                .allow_negative_numbers(true)
-                .help("Worker threads, 0 for one per core; changes the speed, never the result"),
-        )
+        .arg(threads())
 }
 
 fn apply() -> Command {
@@ -212,6 +213,39 @@ fn apply() -> Command {
         .arg(switch("quiet", "Say nothing but errors").short('q'))
 }
 
+fn lattice() -> Command {
+    Command::new(LatticeParams::VERB)
+        .about("Finds by which displacements a photo of bricks, tiles or cloth repeats.")
+        .before_help(LATTICE_EXAMPLES)
+        .arg(file("photo", "PHOTO", "The photo: PNG, JPEG, TIFF, WebP, EXR and others").required(true))
+        .args(LatticeParams::schema().into_iter().map(flag))
+        .next_help_heading("Outputs")
+        .arg(
+            file("overlay", "FILE", "Write the photo with the lattice drawn over it, also if it is but a guess")
+                .long("overlay"),
+        )
+        .arg(
+            file("autocorrelation", "FILE", "Write the autocorrelation that was looked at, no displacement in the middle: \
+                 EXR holds it as it is (-1 to 1), other formats as grey, 0 at half")
+                .long("autocorrelation"),
+        )
+        .arg(switch("force", "Overwrite outputs that exist already"))
+        .arg(json())
+        .arg(switch("quiet", "Say nothing but errors").short('q'))
+        .next_help_heading("Running")
+        .arg(threads())
+}
+
+fn threads() -> Arg {
+    Arg::new("threads")
+        .long("threads")
+        .value_name("N")
+        .default_value("0")
+        .value_parser(value_parser!(usize))
+        .allow_negative_numbers(true)
+        .help("Worker threads, 0 for one per core; changes the speed, never the result")
+}
+
 /// The flag of one parameter.
 fn flag(param: Param) -> Arg {
     let mut facts = Vec::new();
@@ -244,6 +278,18 @@ fn flag(param: Param) -> Arg {
         .allow_negative_numbers(true)
         .help_heading("Parameters")
         .help(help)
+}
+
+/// The lattice's parameters as typed, checked one by one.
+pub(super) fn lattice_params(matches: &ArgMatches) -> Result<LatticeParams> {
+    let mut params = LatticeParams::default();
+    for param in LatticeParams::schema() {
+        if let Some(text) = matches.get_one::<String>(param.name) {
+            params.set(param.name, text)?;
+        }
+    }
+    params.validate()?;
+    Ok(params)
 }
 
 /// The tile's parameters as typed, checked one by one.

@@ -7,6 +7,7 @@ mod apply;
 mod args;
 mod exit;
 mod files;
+mod lattice;
 mod maps;
 mod output;
 mod preview;
@@ -39,6 +40,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
     let result = match command {
         "tile" => tile::run(matches),
         "apply" => apply::run(matches),
+        "lattice" => lattice::run(matches),
         "params" => small::params(matches),
         "info" => small::info(matches),
         "completions" => small::completions(matches),
