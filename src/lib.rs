@@ -25,6 +25,7 @@ pub mod search;
 pub mod signal;
 pub mod verb;
 
+pub use analyze::lattice::snap::Snap;
 pub use base::ctx::{Ctx, Job, Simd};
 pub use base::error::{Error, ErrorKind, Result};
 pub use image::mask::Mask;
@@ -34,7 +35,6 @@ pub use image::sigma_map::SigmaMap;
 pub use image::sourcemap::{Origin, SourceMap};
 pub use image::symmetry::Symmetry;
 pub use verb::inputs::Inputs;
-pub use analyze::lattice::snap::Snap;
 pub use verb::lattice::{Lattice, LatticeParams, detect_lattice, lattice_autocorrelation};
 pub use verb::params::{Axis, Measure, Method, Quality, Size, Symmetries, TileParams};
 pub use verb::texture_cost::{TextureCost, TextureCostParams, texture_cost};

@@ -2,7 +2,8 @@
 
 `tile` makes a texture that repeats from a casual photo; the `Tile` it returns holds the picture
 and says which pixel of the photo each of its pixels is, so that other maps of the same material
-can follow (`apply`). `texture_cost` measures how much a texture looks like its photo.
+can follow (`apply`). `detect_lattice` finds by which displacements a photo of bricks, tiles or
+cloth repeats. `texture_cost` measures how much a texture looks like its photo.
 `read_image` and `write_image` keep all the bits that files have. `study` compares the ways to
 tile over many photos.
 Everything raised on purpose is a `TexforgeError`.
@@ -31,6 +32,7 @@ from texforge._errors import (
     SameFileError,
     TexforgeError,
 )
+from texforge._lattice import detect_lattice
 from texforge._measure import texture_cost
 from texforge._study import Study, study
 from texforge._texforge import __version__
@@ -40,6 +42,7 @@ from texforge._types import (
     Encoding,
     Image,
     ImageLike,
+    Lattice,
     MapKind,
     Measure,
     Method,
@@ -47,6 +50,7 @@ from texforge._types import (
     Progress,
     ProgressBar,
     Quality,
+    Snap,
     SourceMap,
     Step,
     Symmetries,
@@ -66,6 +70,7 @@ __all__ = [
     "Image",
     "ImageLike",
     "InternalError",
+    "Lattice",
     "MapKind",
     "Measure",
     "Method",
@@ -80,6 +85,7 @@ __all__ = [
     "Quality",
     "ReadError",
     "SameFileError",
+    "Snap",
     "SourceMap",
     "Step",
     "Study",
@@ -90,6 +96,7 @@ __all__ = [
     "TileOptions",
     "__version__",
     "apply",
+    "detect_lattice",
     "load_source_map",
     "read_image",
     "study",

@@ -597,16 +597,7 @@ def _text(name: str, kind: str, value: Any) -> str:
         return _size_text(value)
     if kind == "integer":
         return str(_arrays.integer(name, value))
-    return _number(name, value) if kind == "number" else _arrays.word(name, value)
-
-
-def _number(name: str, value: Any) -> str:
-    try:
-        return repr(float(value))
-    except (TypeError, ValueError):
-        raise ParameterError(
-            f"`{name}` must be a number, got {value!r}", fields={"name": name}
-        ) from None
+    return _arrays.number(name, value) if kind == "number" else _arrays.word(name, value)
 
 
 def _typed(params: dict[str, str]) -> dict[str, Any]:

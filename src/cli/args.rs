@@ -217,17 +217,28 @@ fn lattice() -> Command {
     Command::new(LatticeParams::VERB)
         .about("Finds by which displacements a photo of bricks, tiles or cloth repeats.")
         .before_help(LATTICE_EXAMPLES)
-        .arg(file("photo", "PHOTO", "The photo: PNG, JPEG, TIFF, WebP, EXR and others").required(true))
+        .arg(
+            file("photo", "PHOTO", "The photo: PNG, JPEG, TIFF, WebP, EXR and others")
+                .required(true),
+        )
         .args(LatticeParams::schema().into_iter().map(flag))
         .next_help_heading("Outputs")
         .arg(
-            file("overlay", "FILE", "Write the photo with the lattice drawn over it, also if it is but a guess")
-                .long("overlay"),
+            file(
+                "overlay",
+                "FILE",
+                "Write the photo with the lattice drawn over it, also if it is but a guess",
+            )
+            .long("overlay"),
         )
         .arg(
-            file("autocorrelation", "FILE", "Write the autocorrelation that was looked at, no displacement in the middle: \
-                 EXR holds it as it is (-1 to 1), other formats as grey, 0 at half")
-                .long("autocorrelation"),
+            file(
+                "autocorrelation",
+                "FILE",
+                "Write the autocorrelation that was looked at, no displacement in the middle: \
+                 EXR holds it as it is (-1 to 1), other formats as grey, 0 at half",
+            )
+            .long("autocorrelation"),
         )
         .arg(switch("force", "Overwrite outputs that exist already"))
         .arg(json())

@@ -96,7 +96,8 @@ fn report(lattice: &Lattice) -> serde_json::Value {
 
 fn text(lattice: &Lattice) -> String {
     let vector = |[x, y]: [f64; 2]| format!("{x:.2} right, {y:.2} down");
-    let verdict = if lattice.found { "found" } else { "none found; the vectors are but the best guess" };
+    let verdict =
+        if lattice.found { "found" } else { "none found; the vectors are but the best guess" };
     let row = |name: &str, value: String| vec![name.to_owned(), value];
     table(&[
         row("lattice", verdict.to_owned()),

@@ -27,7 +27,11 @@ pub fn lattice(picture: &Picture, [v1, v2]: [[f64; 2]; 2]) -> Result<Picture> {
     let half = (HALF * width.max(height) as f64).max(0.5);
     let unit = |i: usize| {
         let v = picture.samples().unit(i);
-        let v = if picture.encoding == Encoding::Linear { srgb_from_linear(v.clamp(0.0, 1.0)) } else { v };
+        let v = if picture.encoding == Encoding::Linear {
+            srgb_from_linear(v.clamp(0.0, 1.0))
+        } else {
+            v
+        };
         if v.is_finite() { v.clamp(0.0, 1.0) * 255.0 } else { 0.0 }
     };
     let colored = channels >= 3;

@@ -311,7 +311,9 @@ mod tests {
 
     #[test]
     fn it_agrees_with_the_definition() {
-        for (i, (h, w)) in [(9, 12), (7, 7), (1, 10), (11, 1), (1, 1), (2, 5)].into_iter().enumerate() {
+        for (i, (h, w)) in
+            [(9, 12), (7, 7), (1, 10), (11, 1), (1, 1), (2, 5)].into_iter().enumerate()
+        {
             let planes: Vec<_> = (0..3).map(|k| random(h * w, (i * 3 + k) as u64)).collect();
             for n in 1..=3 {
                 ensure_as_defined(&planes[..n], (h, w), &format!("{n} planes of {h}x{w}"));
@@ -326,8 +328,11 @@ mod tests {
         let mut corner = vec![0.25; h * w];
         corner[0] = 1.0;
         corner[1] = 0.5;
-        let half: Vec<f32> =
-            random(h * w, 5).iter().enumerate().map(|(i, &v)| if i % w < 6 { 0.7 } else { v }).collect();
+        let half: Vec<f32> = random(h * w, 5)
+            .iter()
+            .enumerate()
+            .map(|(i, &v)| if i % w < 6 { 0.7 } else { v })
+            .collect();
         let flat = vec![0.1; h * w];
         ensure_as_defined(&[corner.clone()], (h, w), "a corner");
         ensure_as_defined(&[half.clone()], (h, w), "half flat");

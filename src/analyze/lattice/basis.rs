@@ -68,7 +68,8 @@ mod tests {
     #[test]
     fn a_basis_is_reduced_to_its_shortest_vectors() {
         let want = [[40.0, 1.0], [-20.0, 35.0]];
-        for (a, b, c, d) in [(1, 0, 0, 1), (1, 1, 0, 1), (3, 2, 1, 1), (-5, 2, 2, -1), (7, 3, 2, 1)] {
+        for (a, b, c, d) in [(1, 0, 0, 1), (1, 1, 0, 1), (3, 2, 1, 1), (-5, 2, 2, -1), (7, 3, 2, 1)]
+        {
             let make = |a: i32, b: i32| combined(want, f64::from(a), f64::from(b));
             let got = reduced([make(a, b), make(c, d)]);
             let area = |b: Basis| super::area(b);

@@ -188,7 +188,8 @@ fn ridge_directions(plane: &Plane, shorter: f64, lobe: f64) -> Vec<[f64; 2]> {
     let mean = |i: usize| {
         let [y, x] = unit(i);
         let on = |r: usize| plane.sample(y * r as f64, x * r as f64);
-        let (n, sum) = (from..=to as usize).filter_map(on).fold((0, 0.0), |s, v| (s.0 + 1, s.1 + v));
+        let (n, sum) =
+            (from..=to as usize).filter_map(on).fold((0, 0.0), |s, v| (s.0 + 1, s.1 + v));
         if n > 0 { sum / f64::from(n) } else { 0.0 }
     };
     let means: Vec<f64> = (0..count).into_par_iter().map(mean).collect();

@@ -34,8 +34,9 @@ const FAINT: f64 = 0.25;
 const FINER: f64 = 1.35;
 
 /// Strength at which the confidence is a half. Measured: stochastic photographs reach 0.05 (0.07 in
-/// one that contains copies of itself), near-regular ones begin at 0.13.
-const EVEN: f64 = 0.09;
+/// one that contains copies of itself), a picture of four lattices 0.10, near-regular photographs
+/// begin at 0.15.
+const EVEN: f64 = 0.11;
 
 /// A candidate lattice and how well the picture repeats by it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -70,7 +71,7 @@ const STEPS: u64 = SIDES.len() as u64;
 /// there is no candidate at all. Periods shorter than `min_period` pixels do not count.
 ///
 /// # Paper
-/// See [`pairs::best`] for what is compared.
+/// See `pairs::goodness` for what is compared.
 ///
 /// # Errors
 /// [`Error::Cancelled`](crate::Error::Cancelled).

@@ -178,10 +178,10 @@ pub(super) struct Prune {
 ///
 /// The strength is the root of the product of the mean correlation at the multiples and of the mean
 /// by which they exceed the ridges, less its standard error, times n / (n + 3). The goodness is its
-/// power [`ALPHA`] times the number of cells to the power `ALPHA` - 1.
+/// square to the power [`ALPHA`] times the number of cells to the power `ALPHA` - 1.
 ///
 /// # Paper
-/// Eq. 9 is this with the mean correlation for the strength. In a wall of bricks the rows alone
+/// Eq. 9 is this with the mean correlation for the square of the strength. In a wall of bricks the rows alone
 /// correlate so well that any displacement along them is good by that; the excess is what says where
 /// the joints are. The standard error rules out lattices that live from one displacement, such as a
 /// copied piece of the picture.
@@ -189,14 +189,11 @@ pub(super) struct Prune {
 /// # Pruning
 /// The multiples not yet looked at cannot add more than `bounds`; the standard error only lowers.
 /// So a pair is given up only if it would not be among the finalists.
-pub(super) fn goodness(
-    field: &Field,
-    basis: Basis,
-    prune: Option<Prune>,
-) -> Option<Candidate> {
+pub(super) fn goodness(field: &Field, basis: Basis, prune: Option<Prune>) -> Option<Candidate> {
     let cell = area(basis);
     let cells = field.size[0] * field.size[1] / cell;
-    let long = |v: Vector| v[0].abs() > LONGEST * field.size[1] || v[1].abs() > LONGEST * field.size[0];
+    let long =
+        |v: Vector| v[0].abs() > LONGEST * field.size[1] || v[1].abs() > LONGEST * field.size[0];
     if cell < SMALLEST_AREA || cells < CELLS || basis.into_iter().any(long) {
         return None;
     }
@@ -208,7 +205,7 @@ pub(super) fn goodness(
     let preference = cells.powf(ALPHA - 1.0);
     let judged = |excess: f64, correlation: f64| {
         let strength = (excess.max(0.0) * correlation.max(0.0)).sqrt() * n / (n + PRIOR);
-        (strength, libm::pow(strength, ALPHA) * preference)
+        (strength, libm::pow(strength * strength, ALPHA) * preference)
     };
     let total: f64 = multiples.iter().map(|&(_, v)| field.overlap(v)).sum();
     let (mut excess, mut squares, mut correlation, mut left) = (0.0, 0.0, 0.0, total);
@@ -230,4 +227,66 @@ pub(super) fn goodness(
     let error = ((squares / total - excess * excess).max(0.0) / (n - 1.0)).sqrt();
     let (strength, goodness) = judged(excess - error, correlation);
     (goodness > 0.0).then_some(Candidate { basis, goodness, strength, correlation })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::rng::Rng;
+    use crate::signal::autocorrelation::Autocorrelation;
+
+    /// Noise, or noise that repeats every 9 x 11 pixels with as much noise on top.
+    fn field(seed: u64, periodic: bool) -> Field {
+        let (h, w) = (70, 80);
+        let mut rng = Rng::new(seed, 0, 0, 0);
+        let mut noise = || rng.below(1000) as f32 / 1000.0;
+        let cell: Vec<f32> = (0..9 * 11).map(|_| noise()).collect();
+        let value = |i: usize| if periodic { cell[i / w % 9 * 11 + i % w % 11] } else { 0.0 };
+        let plane: Vec<f32> = (0..h * w).map(|i| value(i) + noise()).collect();
+        Field::new(&Autocorrelation::new(&[plane], (h, w)))
+    }
+
+    #[test]
+    fn pruning_changes_nothing() {
+        for seed in 0..4 {
+            for periodic in [false, true] {
+                let field = field(seed, periodic);
+                let (pruned, all) = (search(&field, 3.0, true), search(&field, 3.0, false));
+                assert!(all.len() == FINALISTS, "{} candidates", all.len());
+                assert_eq!(pruned, all, "seed {seed}, periodic {periodic}");
+            }
+        }
+    }
+
+    #[test]
+    fn pruning_gives_pairs_up() {
+        let field = field(1, true);
+        let bounds = bounds(&field, 3.0);
+        let least = best(&field, 3.0)[0].goodness;
+        let off = [[9.4, 4.0], [-4.0, 9.4]];
+        assert!(goodness(&field, off, Some(Prune { bounds, least })).is_none());
+        assert!(
+            goodness(&field, [[11.0, 0.0], [0.0, 9.0]], Some(Prune { bounds, least })).is_some()
+        );
+    }
+
+    #[test]
+    fn multiples_are_those_of_one_half_plane_near_enough() {
+        let field = field(2, false);
+        let basis = [[11.0, 2.0], [-3.0, 9.0]];
+        let got = multiples(&field, basis);
+        let far = DISTANCE * DISTANCE * area(basis);
+        let mut count = 0;
+        for a in -20..=20 {
+            for b in -20..=20 {
+                let v = combined(basis, f64::from(a), f64::from(b));
+                let near = dot(v, v) <= far && field.covers(v) && field.overlap(v) >= OVERLAP;
+                if near && (b > 0 || (b == 0 && a > 0)) {
+                    count += 1;
+                    assert!(got.iter().any(|&(_, u)| u == v), "{a}, {b}");
+                }
+            }
+        }
+        assert_eq!(count, got.len());
+    }
 }
