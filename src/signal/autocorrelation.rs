@@ -255,7 +255,8 @@ fn fast_size(n: usize) -> usize {
         }
         m == 1
     };
-    (n..).find(|&m| smooth(m)).unwrap_or(n)
+    // There is a power of two.
+    (n..=n.next_power_of_two()).find(|&m| smooth(m)).unwrap_or(n)
 }
 
 #[cfg(test)]
@@ -334,8 +335,8 @@ mod tests {
             .map(|(i, &v)| if i % w < 6 { 0.7 } else { v })
             .collect();
         let flat = vec![0.1; h * w];
-        ensure_as_defined(&[corner.clone()], (h, w), "a corner");
-        ensure_as_defined(&[half.clone()], (h, w), "half flat");
+        ensure_as_defined(std::slice::from_ref(&corner), (h, w), "a corner");
+        ensure_as_defined(std::slice::from_ref(&half), (h, w), "half flat");
         ensure_as_defined(&[flat.clone(), half, corner], (h, w), "three planes");
         let gamma = Autocorrelation::new(&[flat.clone(), flat], (h, w));
         assert!(gamma.values().iter().all(|&v| v == 0.0), "flat everywhere");

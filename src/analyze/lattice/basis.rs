@@ -49,7 +49,7 @@ pub fn reduced(basis: Basis) -> Basis {
         }
         let times = (dot(short, long) / dot(short, short)).round();
         let next = [long[0] - times * short[0], long[1] - times * short[1]];
-        if times == 0.0 || !(dot(next, next) < 0.999 * dot(long, long)) {
+        if times == 0.0 || dot(next, next) >= 0.999 * dot(long, long) {
             break;
         }
         long = next;
@@ -72,7 +72,6 @@ mod tests {
         {
             let make = |a: i32, b: i32| combined(want, f64::from(a), f64::from(b));
             let got = reduced([make(a, b), make(c, d)]);
-            let area = |b: Basis| super::area(b);
             assert!((area(got) - area(want)).abs() < 1e-9, "{got:?}");
             assert!(close(got, [[40.0, 1.0], [20.0, 36.0]]) || close(got, want), "{got:?}");
         }

@@ -45,8 +45,11 @@ pub fn snap(basis: Basis, width: usize, height: usize) -> Option<Snap> {
     Some(Snap { width: w, height: h, scale_x, scale_y, periods, misfit: [misfit_x, misfit_y] })
 }
 
-/// Side, scaling, coefficients and misfit of the best displacement along the first axis.
-fn along(basis: Basis, wish: usize) -> Option<(usize, f64, [i64; 2], f64)> {
+/// Side, scaling, coefficients and misfit of a displacement along an axis.
+type Side = (usize, f64, [i64; 2], f64);
+
+/// The best displacement along the first axis.
+fn along(basis: Basis, wish: usize) -> Option<Side> {
     let far = 2.0 * wish as f64;
     let allowed = MISFIT_PIXELS.max(MISFIT * dot(basis[0], basis[0]).sqrt());
     // The vector that leads away from the axis faster brings back what the other has left it by.
@@ -55,7 +58,7 @@ fn along(basis: Basis, wish: usize) -> Option<(usize, f64, [i64; 2], f64)> {
         .map(|corner| coefficients(basis, corner)[1 - back].abs())
         .into_iter()
         .fold(0.0, f64::max) as i64;
-    let mut best: Option<(f64, (usize, f64, [i64; 2], f64))> = None;
+    let mut best: Option<(f64, Side)> = None;
     for i in -most..=most {
         let rest = -(i as f64) * basis[1 - back][1] / basis[back][1];
         for j in [rest.floor() as i64, rest.floor() as i64 + 1] {
