@@ -1,7 +1,8 @@
 //! texforge turns photographs into textures that can be used.
 //!
-//! One verb so far: [`tile`] makes a stationary tile from a casual photo, as a [`Tile`]: the
-//! picture, and the [`SourceMap`] that says which photo pixel each of its pixels is.
+//! [`tile`] makes a stationary tile from a casual photo, as a [`Tile`]: the picture, and the
+//! [`SourceMap`] that says which photo pixel each of its pixels is. [`detect_lattice`] finds by which
+//! displacements a photo of bricks, tiles or cloth repeats.
 //!
 //! ```
 //! use texforge::{Ctx, Encoding, Picture, Samples, TileParams, tile};

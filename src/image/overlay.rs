@@ -10,7 +10,7 @@ const BRIGHT: [f64; 3] = [255.0, 224.0, 32.0];
 
 /// Half the width of a line as a share of the longer side, so that it is seen when the picture is
 /// made small; at least half a pixel.
-const HALF: f64 = 0.0008;
+const HALF: f64 = 0.0012;
 
 /// The lines of a lattice through the picture's middle, bright with dark rims, on the picture as
 /// 8-bit sRGB without alpha. Of data, and of more than four channels, the first channels are shown.
