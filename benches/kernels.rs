@@ -28,6 +28,7 @@ use texforge::search::place_cost::PlaceCost;
 use texforge::search::seams::{self, Canvas};
 use texforge::search::source::Source;
 use texforge::search::vote::vote;
+use texforge::signal::autocorrelation::Autocorrelation;
 use texforge::signal::histogram::{SOFT_BITS, SOFT_MAX, Soft};
 use texforge::signal::measure::{Order, Statistic};
 use texforge::signal::window::{Domain, Window};
@@ -56,6 +57,7 @@ fn main() {
         votes(&mut bench, &ctx);
         projection(&mut bench);
         settling(&mut bench, &ctx);
+        autocorrelations(&mut bench);
         bench.final_summary();
         if !std::env::args().any(|a| a == "--test") {
             let table = limits(&ctx) + &quality(&ctx);
@@ -365,6 +367,38 @@ fn settling(bench: &mut Bench, ctx: &Ctx) {
 
 /// Label, comparisons and work of one row of the table.
 type Row<'a> = (String, usize, Box<dyn Fn() + 'a>);
+
+/// The autocorrelation of a megapixel in color, beside the bare transforms that it needs: of three
+/// planes and back, padded to twice the side, without moving rows to columns.
+fn autocorrelations(bench: &mut Bench) {
+    const SIDE: usize = 1024;
+    let mut rng = Rng::new(1, 0, 0, 0);
+    let cell: Vec<f32> = (0..3 * 32 * 32).map(|_| rng.below(256) as f32).collect();
+    let value = |i: usize, k: usize| cell[(i / SIDE % 32 * 32 + i % 32) * 3 + k];
+    let planes: Vec<Vec<f32>> =
+        (0..3).map(|k| (0..SIDE * SIDE).map(|i| value(i, k)).collect()).collect();
+    let gamma = Autocorrelation::new(&planes, (SIDE, SIDE));
+    assert!(gamma.at(32, -64) > 0.9999 && gamma.at(16, 7) < 0.9, "a period of 32");
+    let mut group = bench.benchmark_group("autocorrelation");
+    group.bench_function("1024x1024 RGB", |b| {
+        b.iter(|| Autocorrelation::new(black_box(&planes), (SIDE, SIDE)));
+    });
+    let rows = realfft::RealFftPlanner::<f64>::new().plan_fft_forward(2 * SIDE);
+    let columns = rustfft::FftPlanner::<f64>::new().plan_fft_forward(2 * SIDE);
+    let (mut real, mut bins) = (rows.make_input_vec(), rows.make_output_vec());
+    let mut column = vec![realfft::num_complex::Complex::new(0.0, 0.0); 2 * SIDE];
+    group.bench_function("bare transforms", |b| {
+        b.iter(|| {
+            for _ in 0..4 * 2 * SIDE {
+                rows.process(black_box(&mut real), &mut bins).unwrap();
+            }
+            for _ in 0..4 * (SIDE + 1) {
+                columns.process(black_box(&mut column));
+            }
+        });
+    });
+    group.finish();
+}
 
 /// Comparisons per second of everything, against the hot kernel's, measured in turns.
 fn limits(ctx: &Ctx) -> String {

@@ -1,7 +1,8 @@
 //! texforge turns photographs into textures that can be used.
 //!
-//! One verb so far: [`tile`] makes a stationary tile from a casual photo, as a [`Tile`]: the
-//! picture, and the [`SourceMap`] that says which photo pixel each of its pixels is.
+//! [`tile`] makes a stationary tile from a casual photo, as a [`Tile`]: the picture, and the
+//! [`SourceMap`] that says which photo pixel each of its pixels is. [`detect_lattice`] finds by which
+//! displacements a photo of bricks, tiles or cloth repeats.
 //!
 //! ```
 //! use texforge::{Ctx, Encoding, Picture, Samples, TileParams, tile};
@@ -25,6 +26,7 @@ pub mod search;
 pub mod signal;
 pub mod verb;
 
+pub use analyze::lattice::snap::Snap;
 pub use base::ctx::{Ctx, Job, Simd};
 pub use base::error::{Error, ErrorKind, Result};
 pub use image::mask::Mask;
@@ -35,6 +37,7 @@ pub use image::sigma_map::SigmaMap;
 pub use image::sourcemap::{Origin, SourceMap};
 pub use image::symmetry::Symmetry;
 pub use verb::inputs::Inputs;
+pub use verb::lattice::{Lattice, LatticeParams, detect_lattice, lattice_autocorrelation};
 pub use verb::palette::{Palette, palette};
 pub use verb::params::{Axis, Measure, Method, Quality, Size, Symmetries, TileParams};
 pub use verb::redo::Redo;

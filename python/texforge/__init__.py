@@ -2,8 +2,9 @@
 
 `tile` makes a texture that repeats from a casual photo; the `Tile` it returns holds the picture
 and says which pixel of the photo each of its pixels is, so that other maps of the same material
-can follow (`apply`). `palette` shows how even it can become. `texture_cost`
-measures how much a texture looks like its photo.
+can follow (`apply`). `palette` shows how even it can become. `detect_lattice` finds by which
+displacements a photo of bricks, tiles or cloth repeats. `texture_cost` measures how much a texture
+looks like its photo.
 `read_image` and `write_image` keep all the bits that files have. `study` compares the ways to
 tile over many photos.
 Everything raised on purpose is a `TexforgeError`.
@@ -32,6 +33,7 @@ from texforge._errors import (
     SameFileError,
     TexforgeError,
 )
+from texforge._lattice import detect_lattice
 from texforge._measure import texture_cost
 from texforge._palette import Palette, palette
 from texforge._study import Study, study
@@ -42,6 +44,7 @@ from texforge._types import (
     Encoding,
     Image,
     ImageLike,
+    Lattice,
     MapKind,
     Measure,
     Method,
@@ -49,6 +52,7 @@ from texforge._types import (
     Progress,
     ProgressBar,
     Quality,
+    Snap,
     SourceMap,
     Step,
     Symmetries,
@@ -68,6 +72,7 @@ __all__ = [
     "Image",
     "ImageLike",
     "InternalError",
+    "Lattice",
     "MapKind",
     "Measure",
     "Method",
@@ -83,6 +88,7 @@ __all__ = [
     "Quality",
     "ReadError",
     "SameFileError",
+    "Snap",
     "SourceMap",
     "Step",
     "Study",
@@ -93,6 +99,7 @@ __all__ = [
     "TileOptions",
     "__version__",
     "apply",
+    "detect_lattice",
     "load_source_map",
     "palette",
     "read_image",

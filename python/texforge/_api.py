@@ -659,17 +659,8 @@ def _text(name: str, kind: str, value: Any) -> str:
     if kind == "integer":
         return str(_arrays.integer(name, value))
     if kind == "optional number":
-        return "none" if value is None else _number(name, value)
-    return _number(name, value) if kind == "number" else _arrays.word(name, value)
-
-
-def _number(name: str, value: Any) -> str:
-    try:
-        return repr(float(value))
-    except (TypeError, ValueError):
-        raise ParameterError(
-            f"`{name}` must be a number, got {value!r}", fields={"name": name}
-        ) from None
+        return "none" if value is None else _arrays.number(name, value)
+    return _arrays.number(name, value) if kind == "number" else _arrays.word(name, value)
 
 
 def _typed(params: dict[str, str]) -> dict[str, Any]:

@@ -203,6 +203,16 @@ def integer(name: str, value: Any, low: int = 0, high: int = 2**64 - 1) -> int:
     return number
 
 
+def number(name: str, value: Any) -> str:
+    """Return an argument that must be a number as the text that the core reads."""
+    try:
+        return repr(float(value))
+    except (TypeError, ValueError):
+        raise ParameterError(
+            f"`{name}` must be a number, got {value!r}", fields={"name": name}
+        ) from None
+
+
 def word(name: str, value: object) -> str:
     """Return an argument that must be a word."""
     if not isinstance(value, str):

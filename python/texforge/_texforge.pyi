@@ -7,6 +7,10 @@ _Picture = tuple[Any, str, tuple[int, int, int], str]
 _PictureOut = tuple[bytearray, str, tuple[int, int, int], str]
 _Step = tuple[int, int, float | None, float]
 _Size = tuple[int, int]
+_Vector = tuple[float, float]
+_Found = tuple[
+    list[float], list[float], float, bool, float, float, tuple[_PictureOut, list[float]] | None
+]
 _Map = tuple[Any, _Size, list[_Size], Any]
 _MapOut = tuple[bytearray, _Size, list[_Size], bytearray | None]
 _Palette = tuple[list[float], list[tuple[float, float]], _PictureOut]
@@ -20,6 +24,9 @@ __all__ = [
     "encode_png",
     "error_kinds",
     "fail",
+    "lattice",
+    "lattice_overlay",
+    "lattice_snap",
     "map_kind",
     "read",
     "read_source_map",
@@ -60,6 +67,18 @@ def texture_cost(
     threads: int,
     progress: Callable[[float], object] | None,
 ) -> tuple[float, float, int]: ...
+def lattice(
+    *,
+    photo: _Picture,
+    params: list[tuple[str, str]],
+    autocorrelation: bool,
+    threads: int,
+    progress: Callable[[float], object] | None,
+) -> _Found: ...
+def lattice_overlay(*, picture: _Picture, v1: _Vector, v2: _Vector) -> _PictureOut: ...
+def lattice_snap(
+    *, v1: _Vector, v2: _Vector, width: int, height: int
+) -> tuple[int, int, list[float], list[list[int]], list[float]] | None: ...
 def apply(*, source_map: _Map, pictures: list[_Picture], kind: str) -> _PictureOut: ...
 def read(*, path: str, kind: str) -> _PictureOut: ...
 def write(

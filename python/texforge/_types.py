@@ -19,6 +19,7 @@ __all__ = [
     "Encoding",
     "Image",
     "ImageLike",
+    "Lattice",
     "MapKind",
     "Measure",
     "Method",
@@ -26,6 +27,7 @@ __all__ = [
     "Progress",
     "ProgressBar",
     "Quality",
+    "Snap",
     "SourceMap",
     "Step",
     "Symmetries",
@@ -223,6 +225,117 @@ class Step(NamedTuple):
     iteration: int
     texture: float
     stationarity: float
+
+
+class Snap(NamedTuple):
+    """A size after which a lattice repeats on both axes: see `Lattice.snap`."""
+
+    size: tuple[int, int]
+    """Height and width in pixels, after scaling."""
+    scale: tuple[float, float]
+    """By what height and width of the photo must be multiplied so that `size` is a whole number of
+    periods; within 3 % of 1."""
+    periods: tuple[tuple[int, int], tuple[int, int]]
+    """How often `v1` and `v2` are in the vertical displacement, and in the horizontal one."""
+    misfit: tuple[float, float]
+    """By how many pixels of the photo the vertical displacement misses the vertical and the
+    horizontal one the horizontal, which scaling cannot mend; at most half a pixel or 3 % of
+    `v1`."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Lattice:
+    """By which displacements a photo repeats, found by `texforge.detect_lattice`.
+
+    In a notebook it shows itself drawn over the photo.
+
+    Attributes
+    ----------
+    v1 : (float, float)
+        The shortest displacement, in pixels: to the right, downwards.
+    v2 : (float, float)
+        The shortest that is no multiple of `v1`. Both point from 70 degrees above the right to 110
+        degrees below it.
+    confidence : float
+        How sure it is that the photo has a lattice and this is it, 0 to 1.
+    found : bool
+        Whether the confidence reaches `min_confidence`. Else the vectors are but the best guess.
+    goodness : float
+        What candidates were compared by.
+    correlation : float
+        The mean autocorrelation at the lattice's displacements, -1 to 1.
+    photo : (H, W) or (H, W, C) ndarray
+        The photo.
+    encoding : {"srgb", "linear", "data"}
+        What its numbers mean.
+    autocorrelation : (2h - 1, 2w - 1) ndarray of float32, or None
+        The generalized normalized autocorrelation of the photo, reduced to h x w pixels with its
+        light evened out, if it was asked for: -1 to 1, no displacement in the middle.
+    autocorrelation_scale : (float, float) or None
+        How many of its pixels are one of the photo, downwards and to the right.
+    """
+
+    v1: tuple[float, float]
+    v2: tuple[float, float]
+    confidence: float
+    found: bool
+    goodness: float
+    correlation: float
+    photo: npt.NDArray[Any]
+    encoding: Encoding
+    autocorrelation: npt.NDArray[np.float32] | None = None
+    autocorrelation_scale: tuple[float, float] | None = None
+
+    def overlay(self, image: ImageLike | None = None) -> npt.NDArray[np.uint8]:
+        """Draw the lattice over the photo, or over a picture that fits it.
+
+        Parameters
+        ----------
+        image : array_like, optional
+            The picture to draw over; the photo if left out.
+
+        Returns
+        -------
+        (H, W, 3) ndarray of uint8
+            The picture as sRGB with bright, dark-rimmed lines through its middle.
+        """
+        from texforge import _lattice
+
+        return _lattice.overlay(self, image)
+
+    def snap(self, size: int | tuple[int, int]) -> Snap | None:
+        """Return the size nearest to a wished one after which the lattice repeats on both axes.
+
+        Parameters
+        ----------
+        size : int or (int, int)
+            The wished height and width, or one number for both.
+
+        Returns
+        -------
+        Snap or None
+            The wished side itself wherever the photo need be scaled by no more than 3 % for it,
+            else the nearest whole number of periods; None if there is none from half to twice the
+            size.
+        """
+        from texforge import _lattice
+
+        return _lattice.snap(self, size)
+
+    def __repr__(self) -> str:
+        """Say what it is in one line."""
+        (ax, ay), (bx, by) = self.v1, self.v2
+        found = "" if self.found else ", not found"
+        return (
+            f"Lattice(({ax:.2f}, {ay:.2f}), ({bx:.2f}, {by:.2f}), "
+            f"confidence {self.confidence:.2f}{found})"
+        )
+
+    def _repr_png_(self) -> bytes:
+        """Return the lattice over the photo, for notebooks."""
+        from texforge import _lattice
+
+        return _lattice.preview_png(self)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -1,6 +1,7 @@
 //! Room 4: numbers about one picture.
 
 pub mod appearance;
+pub mod lattice;
 pub mod nearest;
 pub mod stationarity;
 pub mod texture;

@@ -10,6 +10,7 @@ use crate::base::params::{Param, Value as _};
 use crate::cli::sources::Sources;
 use crate::cli::{maps, palette, study};
 use crate::image::material::MapKind;
+use crate::verb::lattice::LatticeParams;
 use crate::verb::params::TileParams;
 use crate::verb::tile::MAX_VARIANTS;
 
@@ -33,6 +34,13 @@ Examples:
   texforge apply brick_source.exr photo_wetness.png -o brick_wetness.png --kind data
   texforge apply grass_source.exr a_normal_gl.png --also b_normal_gl.png -o grass_normal_gl.png";
 
+const LATTICE_EXAMPLES: &str = "\
+Examples:
+  texforge lattice bricks.jpg
+  texforge lattice bricks.jpg --overlay lattice.png
+  texforge lattice bricks.jpg --json
+  texforge lattice tablecloth.jpg --min-period 30";
+
 /// The whole command line.
 pub(super) fn command() -> Command {
     Command::new("texforge")
@@ -51,6 +59,7 @@ pub(super) fn command() -> Command {
         .subcommand(tile())
         .subcommand(palette::command())
         .subcommand(apply())
+        .subcommand(lattice())
         .subcommand(study::command())
         .subcommand(
             Command::new("params")
@@ -88,7 +97,7 @@ pub(super) fn command() -> Command {
                 .arg(
                     Arg::new("verb")
                         .value_name("COMMAND")
-                        .value_parser(["tile", "palette", "apply", "study", "params", "info", "completions"])
+                        .value_parser(["tile", "palette", "apply", "lattice", "study", "params", "info", "completions"])
                         .help("The page of this command"),
                 ),
         )
@@ -163,13 +172,7 @@ pub(super) fn running() -> [Arg; 2] {
             .value_parser(value_parser!(u64))
             .allow_negative_numbers(true)
             .help("Seed of all random choices; the same seed gives the same pixels on any machine"),
-        Arg::new("threads")
-            .long("threads")
-            .value_name("N")
-            .default_value("0")
-            .value_parser(value_parser!(usize))
-            .allow_negative_numbers(true)
-            .help("Worker threads, 0 for one per core; changes the speed, never the result"),
+        threads(),
     ]
 }
 
@@ -224,6 +227,47 @@ fn apply() -> Command {
         .arg(switch("quiet", "Say nothing but errors").short('q'))
 }
 
+fn lattice() -> Command {
+    Command::new(LatticeParams::VERB)
+        .about("Finds by which displacements a photo of bricks, tiles or cloth repeats.")
+        .before_help(LATTICE_EXAMPLES)
+        .arg(Sources::photo())
+        .args(LatticeParams::schema().into_iter().map(flag))
+        .next_help_heading("Outputs")
+        .arg(
+            file(
+                "overlay",
+                "FILE",
+                "Write the photo with the lattice drawn over it, also if it is but a guess",
+            )
+            .long("overlay"),
+        )
+        .arg(
+            file(
+                "autocorrelation",
+                "FILE",
+                "Write the autocorrelation that was looked at, no displacement in the middle: \
+                 EXR holds it as it is (-1 to 1), other formats as grey, 0 at half",
+            )
+            .long("autocorrelation"),
+        )
+        .arg(switch("force", "Overwrite outputs that exist already"))
+        .arg(json())
+        .arg(switch("quiet", "Say nothing but errors").short('q'))
+        .next_help_heading("Running")
+        .arg(threads())
+}
+
+fn threads() -> Arg {
+    Arg::new("threads")
+        .long("threads")
+        .value_name("N")
+        .default_value("0")
+        .value_parser(value_parser!(usize))
+        .allow_negative_numbers(true)
+        .help("Worker threads, 0 for one per core; changes the speed, never the result")
+}
+
 /// The flag of one parameter.
 pub(super) fn flag(param: Param) -> Arg {
     let mut facts = Vec::new();
@@ -256,6 +300,18 @@ pub(super) fn flag(param: Param) -> Arg {
         .allow_negative_numbers(true)
         .help_heading("Parameters")
         .help(help)
+}
+
+/// The lattice's parameters as typed, checked one by one.
+pub(super) fn lattice_params(matches: &ArgMatches) -> Result<LatticeParams> {
+    let mut params = LatticeParams::default();
+    for param in LatticeParams::schema() {
+        if let Some(text) = matches.get_one::<String>(param.name) {
+            params.set(param.name, text)?;
+        }
+    }
+    params.validate()?;
+    Ok(params)
 }
 
 /// The tile's parameters as typed, checked one by one.

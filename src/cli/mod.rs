@@ -7,6 +7,7 @@ mod apply;
 mod args;
 mod exit;
 mod files;
+mod lattice;
 mod maps;
 mod output;
 mod palette;
@@ -41,6 +42,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
         "tile" => tile::run(matches),
         "palette" => palette::run(matches),
         "apply" => apply::run(matches),
+        "lattice" => lattice::run(matches),
         "params" => small::params(matches),
         "info" => small::info(matches),
         "completions" => small::completions(matches),

@@ -5,6 +5,7 @@ pub mod io;
 pub mod mask;
 pub mod material;
 pub mod normals;
+pub mod overlay;
 pub mod picture;
 pub mod rect;
 pub mod sheet;

@@ -15,16 +15,19 @@ use std::path::PathBuf;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
+use crate::analyze::lattice::snap;
 use crate::base::ctx::Ctx;
 use crate::base::error::{Error, ErrorKind, Result};
 use crate::base::params::Value as _;
 use crate::image::io::{self, Format, WriteOptions};
 use crate::image::mask::Mask;
 use crate::image::material::{self, MapKind};
+use crate::image::overlay;
 use crate::image::picture::Picture;
 use crate::image::rect::Rect;
 use crate::image::sigma_map::SigmaMap;
 use crate::verb::inputs::Inputs;
+use crate::verb::lattice::{Lattice, LatticeParams, detect_lattice, lattice_autocorrelation};
 use crate::verb::params::TileParams;
 use crate::verb::redo::Redo;
 use crate::verb::texture_cost as measure;
@@ -195,6 +198,66 @@ fn texture_cost<'py>(
     Ok((cost.mean, cost.margin, cost.samples))
 }
 
+/// A lattice for Python: both vectors, confidence, whether found, goodness, correlation, and if asked
+/// for the autocorrelation and how many of its pixels are one of the photo.
+type LatticeOut<'py> = ([f64; 2], [f64; 2], f64, bool, f64, f64, Option<(ArrayOut<'py>, [f64; 2])>);
+
+/// Finds the lattice of a photo.
+#[pyfunction]
+#[pyo3(signature = (*, photo, params, autocorrelation, threads, progress))]
+fn lattice<'py>(
+    py: Python<'py>,
+    photo: ArrayIn<'py>,
+    params: Vec<(String, String)>,
+    autocorrelation: bool,
+    threads: usize,
+    progress: Option<Bound<'py, PyAny>>,
+) -> PyResult<LatticeOut<'py>> {
+    let mut settings = LatticeParams::default();
+    for (name, text) in &params {
+        settings.set(name, text).into_py(py)?;
+    }
+    let photo = photo.picture(py)?;
+    let ctx = Ctx::new(0, threads).into_py(py)?;
+    let job = ctx.job();
+    let (found, map) = enter::enter(py, &job, progress.as_ref(), move || {
+        let found = detect_lattice(&ctx, &photo, &settings)?;
+        let map = autocorrelation.then(|| lattice_autocorrelation(&ctx, &photo)).transpose()?;
+        Ok((found, map))
+    })?;
+    let map = match map {
+        Some((map, scale)) => Some((array_out(py, &map)?, scale)),
+        None => None,
+    };
+    let Lattice { v1, v2, confidence, found, goodness, correlation } = found;
+    Ok((v1, v2, confidence, found, goodness, correlation, map))
+}
+
+/// Draws a lattice over a picture.
+#[pyfunction]
+#[pyo3(signature = (*, picture, v1, v2))]
+fn lattice_overlay<'py>(
+    py: Python<'py>,
+    picture: ArrayIn<'py>,
+    v1: [f64; 2],
+    v2: [f64; 2],
+) -> PyResult<ArrayOut<'py>> {
+    let picture = picture.picture(py)?;
+    let out = enter::unheard(py, move || overlay::lattice(&picture, [v1, v2]))?;
+    array_out(py, &out)
+}
+
+/// A snapped size: width, height, scalings, periods, misfits.
+type SnapOut = (usize, usize, [f64; 2], [[i64; 2]; 2], [f64; 2]);
+
+/// The size near a wished one after which a lattice repeats.
+#[pyfunction]
+#[pyo3(signature = (*, v1, v2, width, height))]
+fn lattice_snap(v1: [f64; 2], v2: [f64; 2], width: usize, height: usize) -> Option<SnapOut> {
+    let snap = snap::snap([v1, v2], width, height)?;
+    Some((snap.width, snap.height, [snap.scale_x, snap.scale_y], snap.periods, snap.misfit))
+}
+
 /// Gathers a map, one picture of each photo, through a source map.
 #[pyfunction]
 #[pyo3(signature = (*, source_map, pictures, kind))]
@@ -274,7 +337,7 @@ fn map_kind(name: &str) -> String {
     material::classify(name).map_or(MapKind::Data, |(_, kind)| kind).show()
 }
 
-/// Every parameter of a verb (`texture_cost`, else `tile`), with its default as text.
+/// Every parameter of a Python function (`texture_cost`, `detect_lattice`, else `tile`), with its default as text.
 #[pyfunction]
 #[pyo3(signature = (verb = "tile"))]
 fn schema<'py>(py: Python<'py>, verb: &str) -> PyResult<Vec<Bound<'py, PyDict>>> {
@@ -291,6 +354,7 @@ fn schema<'py>(py: Python<'py>, verb: &str) -> PyResult<Vec<Bound<'py, PyDict>>>
     };
     let params = match verb {
         TextureCostParams::VERB => TextureCostParams::schema(),
+        "detect_lattice" => LatticeParams::schema(),
         _ => TileParams::schema(),
     };
     params.into_iter().map(entry).collect()
@@ -341,8 +405,9 @@ fn cli_study(py: Python<'_>, args: Vec<OsString>) -> PyResult<(u8, Option<Bound<
 mod _texforge {
     #[pymodule_export]
     use super::{
-        apply, cli_main, cli_study, encode_png, error_kinds, fail, map_kind, read, read_source_map,
-        schema, texture_cost, tiles, write, write_source_map,
+        apply, cli_main, cli_study, encode_png, error_kinds, fail, lattice, lattice_overlay,
+        lattice_snap, map_kind, read, read_source_map, schema, texture_cost, tiles, write,
+        write_source_map,
     };
 
     use pyo3::prelude::*;

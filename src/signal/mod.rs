@@ -1,5 +1,6 @@
 //! Room 2: mathematics on planes. No textures, no policy.
 
+pub mod autocorrelation;
 pub mod histogram;
 pub mod localhist;
 pub mod lowpass;

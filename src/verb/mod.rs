@@ -1,6 +1,7 @@
 //! Room 7: the public functions, one file each. They pick methods, combine them and report.
 
 pub mod inputs;
+pub mod lattice;
 mod maker;
 pub mod palette;
 pub mod params;

@@ -6,6 +6,7 @@ mod costs;
 mod golden;
 mod house;
 mod io;
+mod lattice;
 mod measures;
 mod options;
 mod quality;

@@ -11,7 +11,9 @@ import texforge
 from texforge import _texforge
 
 
-@pytest.mark.parametrize("function", [texforge.tile, texforge.texture_cost])
+@pytest.mark.parametrize(
+    "function", [texforge.tile, texforge.texture_cost, texforge.detect_lattice]
+)
 def test_names_order_and_defaults_are_those_of_the_core(function: Callable[..., object]) -> None:
     signature = inspect.signature(function)
     options = [p for p in signature.parameters.values() if p.kind is p.KEYWORD_ONLY]
@@ -38,13 +40,21 @@ def test_the_words_accepted_are_those_of_the_core() -> None:
 
 
 def test_everything_but_the_picture_is_keyword_only() -> None:
-    for function in (texforge.tile, texforge.apply, texforge.read_image, texforge.write_image):
+    for function in (
+        texforge.tile,
+        texforge.apply,
+        texforge.detect_lattice,
+        texforge.read_image,
+        texforge.write_image,
+    ):
         for parameter in inspect.signature(function).parameters.values():
             optional = parameter.default is not parameter.empty
             assert (parameter.kind is parameter.KEYWORD_ONLY) == optional, parameter
 
 
-@pytest.mark.parametrize("function", [texforge.tile, texforge.texture_cost])
+@pytest.mark.parametrize(
+    "function", [texforge.tile, texforge.texture_cost, texforge.detect_lattice]
+)
 def test_every_parameter_is_documented(function: Callable[..., object]) -> None:
     doc = inspect.getdoc(function)
     assert doc is not None
@@ -52,7 +62,9 @@ def test_every_parameter_is_documented(function: Callable[..., object]) -> None:
         assert f"\n{name} : " in doc
 
 
-@pytest.mark.parametrize("function", [texforge.tile, texforge.texture_cost])
+@pytest.mark.parametrize(
+    "function", [texforge.tile, texforge.texture_cost, texforge.detect_lattice]
+)
 def test_ranges_in_the_docs_are_those_of_the_core(function: Callable[..., object]) -> None:
     doc = " ".join((inspect.getdoc(function) or "").split())
     for entry in _texforge.schema(function.__name__):

@@ -1,0 +1,292 @@
+//! Pairs of displacements, and how well a picture repeats by them.
+
+use super::Candidate;
+use super::basis::{Basis, Vector, area, combined, directed, dot};
+use super::field::Field;
+
+/// Preference for small cells among equally good ones. The paper's.
+const ALPHA: f64 = 1.12;
+
+/// Peaks that are paired, by their excess. Pairs grow with the square.
+const PEAKS: usize = 400;
+
+/// Candidates that are fitted and compared again.
+const FINALISTS: usize = 32;
+
+/// Smallest number of cells in the picture: about two by two.
+const CELLS: f64 = 3.5;
+
+/// Smallest area of a cell and shortest vector, in pixels of the reduced picture.
+const SMALLEST_AREA: f64 = 16.0;
+const SHORTEST: f64 = 3.0;
+
+/// Longest component of a vector, as a share of the side: twice that about fits.
+const LONGEST: f64 = 0.55;
+
+/// The multiples within this distance count, as a multiple of the root of the cell's area: about
+/// the 24 (of one half-plane) nearest. Farther ones agree less where rows drift or the camera
+/// stood askew, and are no evidence against the lattice.
+const DISTANCE: f64 = 3.95;
+
+/// Smallest overlap at which a correlation counts.
+const OVERLAP: f64 = 0.16;
+
+/// So many multiples count half: few may agree by chance.
+const PRIOR: f64 = 3.0;
+
+/// The candidates, best first, at most [`FINALISTS`].
+///
+/// # Paper
+/// Near-Regular Texture Synthesis by Random Sampling and Gap Filling (2011), sec. 3.3. Past it:
+/// see the constants, and [`goodness`].
+pub(super) fn best(field: &Field, shortest: f64) -> Vec<Candidate> {
+    search(field, shortest, true)
+}
+
+/// With `prune`, a pair is given up once it cannot be among the finalists any more.
+fn search(field: &Field, shortest: f64, prune: bool) -> Vec<Candidate> {
+    let peaks = peaks(field, shortest.max(SHORTEST));
+    let bounds = bounds(field, shortest.max(SHORTEST));
+    let mut finalists: Vec<Candidate> = Vec::new();
+    for (i, &v1) in peaks.iter().enumerate() {
+        let mut seconds: Vec<Vector> =
+            peaks[i + 1..].iter().filter_map(|&v2| second(v1, v2)).collect();
+        let key = |v: &Vector| (v[0].round() as i64, v[1].round() as i64);
+        seconds.sort_by(|a, b| {
+            key(a).cmp(&key(b)).then(a[0].total_cmp(&b[0])).then(a[1].total_cmp(&b[1]))
+        });
+        seconds.dedup_by_key(|v| key(v));
+        for v2 in seconds {
+            let worst = finalists.last().filter(|_| prune && finalists.len() == FINALISTS);
+            let prune = worst.map(|worst| Prune { bounds, least: worst.goodness });
+            if let Some(candidate) = goodness(field, [v1, v2], prune) {
+                let at = finalists.partition_point(|c| c.goodness >= candidate.goodness);
+                finalists.insert(at, candidate);
+                finalists.truncate(FINALISTS);
+            }
+        }
+    }
+    finalists
+}
+
+/// `v2` less the multiple of `v1` that is nearest to it; `None` if it is then the shorter one.
+fn second(v1: Vector, v2: Vector) -> Option<Vector> {
+    let times = (dot(v1, v2) / dot(v1, v1)).round();
+    let v2 = directed([v2[0] - times * v1[0], v2[1] - times * v1[1]]);
+    // Peaks are as exact as a tenth of a pixel; of equally long ones neither is the shorter.
+    (dot(v2, v2) >= 0.98 * dot(v1, v1)).then_some(v2)
+}
+
+/// Local maxima of the correlation in 5 x 5 displacements that exceed the ridges through them,
+/// between pixels; at most [`PEAKS`], shortest first.
+fn peaks(field: &Field, shortest: f64) -> Vec<Vector> {
+    let limit = [LONGEST * field.size[0], LONGEST * field.size[1]];
+    let [reach_y, reach_x] = field.reach();
+    let mut found: Vec<(f64, Vector)> = Vec::new();
+    for y in -(reach_y - 2)..=reach_y - 2 {
+        for x in 0..=reach_x - 2 {
+            let long = (x as f64) > limit[1] || (y.abs() as f64) > limit[0];
+            if (x == 0 && y <= 0) || long || ((x * x + y * y) as f64) < shortest * shortest {
+                continue;
+            }
+            let (value, excess) = (field.correlation(y, x), field.excess(y, x));
+            if value <= 0.0 || excess <= 0.0 {
+                continue;
+            }
+            let higher = |dy: isize, dx: isize| {
+                let other = field.correlation(y + dy, x + dx);
+                // Of a plateau the first counts.
+                other > value || (other == value && (dy, dx) < (0, 0))
+            };
+            if (-2..=2).all(|dy| (-2..=2).all(|dx| !higher(dy, dx))) {
+                found.push((excess, summit(field, y, x)));
+            }
+        }
+    }
+    found.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1[1].total_cmp(&b.1[1])));
+    found.truncate(PEAKS);
+    let mut peaks: Vec<Vector> = found.into_iter().map(|(_, v)| directed(v)).collect();
+    peaks.sort_by(|a, b| {
+        dot(*a, *a).total_cmp(&dot(*b, *b)).then(a[0].total_cmp(&b[0])).then(a[1].total_cmp(&b[1]))
+    });
+    peaks
+}
+
+/// The top of the parabolas through a maximum and its neighbors.
+pub(super) fn summit(field: &Field, y: isize, x: isize) -> Vector {
+    let offset = |before: f64, middle: f64, after: f64| {
+        let bend = before - 2.0 * middle + after;
+        if bend < -1e-9 { (0.5 * (before - after) / bend).clamp(-0.5, 0.5) } else { 0.0 }
+    };
+    let at = |dy, dx| field.correlation(y + dy, x + dx);
+    [
+        x as f64 + offset(at(0, -1), at(0, 0), at(0, 1)),
+        y as f64 + offset(at(-1, 0), at(0, 0), at(1, 0)),
+    ]
+}
+
+/// No excess and no correlation beyond `shortest` is larger than these.
+fn bounds(field: &Field, shortest: f64) -> [f64; 2] {
+    let [reach_y, reach_x] = field.reach();
+    let mut highest = [0.0f64; 2];
+    for y in -reach_y..=0 {
+        for x in -reach_x..=reach_x {
+            // Between displacements up to the diagonal of a pixel nearer.
+            if ((x * x + y * y) as f64).sqrt() + 1.5 >= shortest {
+                highest[0] = highest[0].max(field.excess(y, x));
+                highest[1] = highest[1].max(field.correlation(y, x));
+            }
+        }
+    }
+    highest
+}
+
+/// The multiples of a basis that count: their coefficients and displacements, of one half-plane.
+pub(super) fn multiples(field: &Field, basis: Basis) -> Vec<([f64; 2], Vector)> {
+    let [v1, v2] = basis;
+    let cell = area(basis);
+    let distance = DISTANCE * cell.sqrt();
+    let length = dot(v1, v1).sqrt();
+    // Rows of multiples of v1, `cell / length` apart.
+    let rows = (distance * length / cell) as i32;
+    let mut found = Vec::new();
+    for b in 0..=rows {
+        let b = f64::from(b);
+        let middle = -b * dot(v1, v2) / (length * length);
+        let half = (distance * distance - (b * cell / length).powi(2)).max(0.0).sqrt() / length;
+        let first = if b == 0.0 { 1 } else { (middle - half).ceil() as i32 };
+        for a in first..=(middle + half).floor() as i32 {
+            let a = f64::from(a);
+            let v = combined(basis, a, b);
+            if field.covers(v) && field.overlap(v) >= OVERLAP {
+                found.push(([a, b], v));
+            }
+        }
+    }
+    found
+}
+
+/// When to give a pair up: no multiple has more excess and correlation than `bounds`, and a goodness
+/// below `least` is of no use.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Prune {
+    bounds: [f64; 2],
+    least: f64,
+}
+
+/// How well the picture repeats by a basis; `None` if it does not, or was given up.
+///
+/// The strength is the root of the product of the mean correlation at the multiples and of the mean
+/// by which they exceed the ridges, less its standard error, times n / (n + 3). The goodness is its
+/// square to the power [`ALPHA`] times the number of cells to the power `ALPHA` - 1.
+///
+/// # Paper
+/// Eq. 9 is this with the mean correlation for the square of the strength. In a wall of bricks the rows alone
+/// correlate so well that any displacement along them is good by that; the excess is what says where
+/// the joints are. The standard error rules out lattices that live from one displacement, such as a
+/// copied piece of the picture.
+///
+/// # Pruning
+/// The multiples not yet looked at cannot add more than `bounds`; the standard error only lowers.
+/// So a pair is given up only if it would not be among the finalists.
+pub(super) fn goodness(field: &Field, basis: Basis, prune: Option<Prune>) -> Option<Candidate> {
+    let cell = area(basis);
+    let cells = field.size[0] * field.size[1] / cell;
+    let long =
+        |v: Vector| v[0].abs() > LONGEST * field.size[1] || v[1].abs() > LONGEST * field.size[0];
+    if cell < SMALLEST_AREA || cells < CELLS || basis.into_iter().any(long) {
+        return None;
+    }
+    let multiples = multiples(field, basis);
+    let n = multiples.len() as f64;
+    if n < 3.0 {
+        return None;
+    }
+    let preference = cells.powf(ALPHA - 1.0);
+    let judged = |excess: f64, correlation: f64| {
+        let strength = (excess.max(0.0) * correlation.max(0.0)).sqrt() * n / (n + PRIOR);
+        (strength, libm::pow(strength * strength, ALPHA) * preference)
+    };
+    let total: f64 = multiples.iter().map(|&(_, v)| field.overlap(v)).sum();
+    let (mut excess, mut squares, mut correlation, mut left) = (0.0, 0.0, 0.0, total);
+    for &(_, v) in &multiples {
+        let weight = field.overlap(v);
+        let (c, e) = field.sample(v);
+        excess += weight * e;
+        squares += weight * e * e;
+        correlation += weight * c;
+        left -= weight;
+        let most = |sum: f64, bound: f64| (sum + left.max(0.0) * bound) / total;
+        if let Some(Prune { bounds, least }) = prune
+            && judged(most(excess, bounds[0]), most(correlation, bounds[1])).1 < least
+        {
+            return None;
+        }
+    }
+    let (excess, correlation) = (excess / total, correlation / total);
+    let error = ((squares / total - excess * excess).max(0.0) / (n - 1.0)).sqrt();
+    let (strength, goodness) = judged(excess - error, correlation);
+    (goodness > 0.0).then_some(Candidate { basis, goodness, strength, correlation })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::rng::Rng;
+    use crate::signal::autocorrelation::Autocorrelation;
+
+    /// Noise, or noise that repeats every 9 x 11 pixels with as much noise on top.
+    fn field(seed: u64, periodic: bool) -> Field {
+        let (h, w) = (70, 80);
+        let mut rng = Rng::new(seed, 0, 0, 0);
+        let mut noise = || rng.below(1000) as f32 / 1000.0;
+        let cell: Vec<f32> = (0..9 * 11).map(|_| noise()).collect();
+        let value = |i: usize| if periodic { cell[i / w % 9 * 11 + i % w % 11] } else { 0.0 };
+        let plane: Vec<f32> = (0..h * w).map(|i| value(i) + noise()).collect();
+        Field::new(&Autocorrelation::new(&[plane], (h, w)))
+    }
+
+    #[test]
+    fn pruning_changes_nothing() {
+        for seed in 0..4 {
+            for periodic in [false, true] {
+                let field = field(seed, periodic);
+                let (pruned, all) = (search(&field, 3.0, true), search(&field, 3.0, false));
+                assert!(all.len() == FINALISTS, "{} candidates", all.len());
+                assert_eq!(pruned, all, "seed {seed}, periodic {periodic}");
+            }
+        }
+    }
+
+    #[test]
+    fn pruning_gives_pairs_up() {
+        let field = field(1, true);
+        let bounds = bounds(&field, 3.0);
+        let least = best(&field, 3.0)[0].goodness;
+        let off = [[9.4, 4.0], [-4.0, 9.4]];
+        assert!(goodness(&field, off, Some(Prune { bounds, least })).is_none());
+        assert!(
+            goodness(&field, [[11.0, 0.0], [0.0, 9.0]], Some(Prune { bounds, least })).is_some()
+        );
+    }
+
+    #[test]
+    fn multiples_are_those_of_one_half_plane_near_enough() {
+        let field = field(2, false);
+        let basis = [[11.0, 2.0], [-3.0, 9.0]];
+        let got = multiples(&field, basis);
+        let far = DISTANCE * DISTANCE * area(basis);
+        let mut count = 0;
+        for a in -20..=20 {
+            for b in -20..=20 {
+                let v = combined(basis, f64::from(a), f64::from(b));
+                let near = dot(v, v) <= far && field.covers(v) && field.overlap(v) >= OVERLAP;
+                if near && (b > 0 || (b == 0 && a > 0)) {
+                    count += 1;
+                    assert!(got.iter().any(|&(_, u)| u == v), "{a}, {b}");
+                }
+            }
+        }
+        assert_eq!(count, got.len());
+    }
+}

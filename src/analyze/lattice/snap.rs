@@ -1,0 +1,161 @@
+//! Rectangles that a lattice repeats in.
+
+use super::basis::{Basis, Vector, coefficients, combined, dot};
+
+/// By how much a photo may be stretched or squeezed. Much more shows as bricks of another shape.
+pub const MOST_SCALING: f64 = 0.03;
+
+/// By how much a displacement may miss the axis: as a share of the shortest vector, and in pixels if
+/// that is more.
+const MISFIT: f64 = 0.03;
+const MISFIT_PIXELS: f64 = 0.5;
+
+/// What a whole allowed misfit costs, as a change of the size: a size 5 % farther away is taken for a
+/// displacement that lies on the axis.
+const MISFIT_COST: f64 = 0.05;
+
+/// A size near a wished one after which a lattice repeats on both axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Snap {
+    /// Width in pixels, after scaling.
+    pub width: usize,
+    /// Height in pixels, after scaling.
+    pub height: usize,
+    /// By what the photo's width must be multiplied so that `width` is a whole number of periods;
+    /// within 3 % of 1.
+    pub scale_x: f64,
+    /// By what the photo's height must be multiplied, likewise.
+    pub scale_y: f64,
+    /// How often v1 and v2 are in the horizontal displacement, and in the vertical one.
+    pub periods: [[i64; 2]; 2],
+    /// By how many pixels of the photo the horizontal displacement misses the horizontal, and the
+    /// vertical one the vertical: what scaling cannot mend. At most 3 % of the shortest vector, or
+    /// half a pixel.
+    pub misfit: [f64; 2],
+}
+
+/// The rectangle nearest to `width` x `height` that the lattice repeats in: the wished side itself
+/// wherever scaling by at most [`MOST_SCALING`] makes it a period, else the nearest period; `None` if
+/// there is none from half to twice the wished side.
+pub fn snap(basis: Basis, width: usize, height: usize) -> Option<Snap> {
+    let (w, scale_x, a, misfit_x) = along(basis, width)?;
+    // The vertical axis is the horizontal one of the transposed lattice.
+    let (h, scale_y, b, misfit_y) = along(basis.map(|[x, y]| [y, x]), height)?;
+    let periods = [a, b];
+    Some(Snap { width: w, height: h, scale_x, scale_y, periods, misfit: [misfit_x, misfit_y] })
+}
+
+/// Side, scaling, coefficients and misfit of a displacement along an axis.
+type Side = (usize, f64, [i64; 2], f64);
+
+/// The best displacement along the first axis.
+fn along(basis: Basis, wish: usize) -> Option<Side> {
+    let far = 2.0 * wish as f64;
+    let allowed = MISFIT_PIXELS.max(MISFIT * dot(basis[0], basis[0]).sqrt());
+    // The vector that leads away from the axis faster brings back what the other has left it by.
+    let back = usize::from(basis[1][1].abs() >= basis[0][1].abs());
+    let most = [[far, allowed], [far, -allowed]]
+        .map(|corner| coefficients(basis, corner)[1 - back].abs())
+        .into_iter()
+        .fold(0.0, f64::max) as i64;
+    let mut best: Option<(f64, Side)> = None;
+    for i in -most..=most {
+        let rest = -(i as f64) * basis[1 - back][1] / basis[back][1];
+        for j in [rest.floor() as i64, rest.floor() as i64 + 1] {
+            let periods = if back == 1 { [i, j] } else { [j, i] };
+            let [length, off]: Vector = combined(basis, periods[0] as f64, periods[1] as f64);
+            if length < 1.0 || off.abs() > allowed {
+                continue;
+            }
+            let fits = |side: usize| (side as f64 / length - 1.0).abs() <= MOST_SCALING;
+            let side = if fits(wish) { wish } else { length.round() as usize };
+            if !fits(side) || 2 * side < wish || side > 2 * wish {
+                continue;
+            }
+            let cost = libm::log(side as f64 / wish as f64).abs()
+                + (side as f64 / length - 1.0).abs()
+                + MISFIT_COST * off.abs() / allowed;
+            if best.is_none_or(|(least, _)| cost < least) {
+                best = Some((cost, (side, side as f64 / length, periods, off.abs())));
+            }
+        }
+    }
+    best.map(|(_, found)| found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By trying all displacements of a square of coefficients.
+    fn naive(basis: Basis, wish: usize) -> Option<(usize, f64)> {
+        let allowed = MISFIT_PIXELS.max(MISFIT * dot(basis[0], basis[0]).sqrt());
+        let mut best: Option<(f64, usize, f64)> = None;
+        for a in -80..=80 {
+            for b in -80..=80 {
+                let [x, y] = combined(basis, f64::from(a), f64::from(b));
+                for side in [x.round().max(0.0) as usize, wish] {
+                    let scale = side as f64 / x;
+                    let near = (scale - 1.0).abs() <= MOST_SCALING;
+                    let wished = (wish as f64 / x - 1.0).abs() <= MOST_SCALING;
+                    if x >= 1.0 && y.abs() <= allowed && near && (side == wish || !wished) {
+                        let cost = (side as f64 / wish as f64).ln().abs()
+                            + (scale - 1.0).abs()
+                            + MISFIT_COST * y.abs() / allowed;
+                        let inside = 2 * side >= wish && side <= 2 * wish;
+                        if inside && best.is_none_or(|b| cost < b.0 - 1e-12) {
+                            best = Some((cost, side, scale));
+                        }
+                    }
+                }
+            }
+        }
+        best.map(|(_, side, scale)| (side, scale))
+    }
+
+    #[test]
+    fn it_finds_what_trying_everything_finds() {
+        let bases = [
+            [[20.0, 0.0], [0.0, 30.0]],
+            [[85.3, -127.8], [85.1, 127.9]],
+            [[16.0, 16.0], [16.0, -16.0]],
+            [[29.4, 1.4], [0.7, -44.8]],
+            [[36.5, 0.0], [-8.9, 13.4]],
+            [[121.1, 63.1], [-62.8, 121.3]],
+        ];
+        let mut found = 0;
+        for basis in bases {
+            for (width, height) in [(256, 256), (500, 300), (97, 411)] {
+                let transposed = basis.map(|[x, y]: [f64; 2]| [y, x]);
+                let want = naive(basis, width).zip(naive(transposed, height));
+                let got = snap(basis, width, height);
+                assert_eq!(got.is_some(), want.is_some(), "{basis:?} at {width}x{height}");
+                if let Some((got, ((w, sx), (h, sy)))) = got.zip(want) {
+                    found += 1;
+                    assert_eq!((got.width, got.height), (w, h), "{basis:?} at {width}x{height}");
+                    assert!((got.scale_x - sx).abs() + (got.scale_y - sy).abs() < 1e-9);
+                }
+            }
+        }
+        assert!(found >= 9, "only {found} could be snapped");
+    }
+
+    #[test]
+    fn a_snapped_size_is_a_scaled_lattice_displacement() {
+        let basis = [[85.3, -127.8], [85.1, 127.9]];
+        let Snap { width, height, scale_x, scale_y, periods, misfit } =
+            snap(basis, 512, 512).expect("near");
+        // Running bond: rows shifted by half, so the rectangle has twice the cell's area.
+        assert_eq!((width, height, periods), (512, 512, [[3, 3], [-2, 2]]));
+        let [x, off_x] = combined(basis, 3.0, 3.0);
+        let [off_y, y] = combined(basis, -2.0, 2.0);
+        assert!((x * scale_x - 512.0).abs() < 1e-9 && (y * scale_y - 512.0).abs() < 1e-9);
+        assert!((misfit[0] - off_x.abs()).abs() + (misfit[1] - off_y.abs()).abs() < 1e-9);
+    }
+
+    #[test]
+    fn without_a_rectangle_near_there_is_none() {
+        assert_eq!(snap([[400.0, 0.0], [0.0, 400.0]], 128, 128), None, "periods too long");
+        assert_eq!(snap([[100.0, 8.0], [-8.0, 100.0]], 300, 300), None, "askew");
+    }
+}

@@ -1,0 +1,279 @@
+//! `detect_lattice` on pictures whose lattice is known, and on pictures that have none.
+
+use std::process::Command;
+
+use assert_cmd::prelude::*;
+use texforge::base::rng::Rng;
+use texforge::{
+    Ctx, Encoding, Error, Lattice, LatticeParams, Picture, Samples, detect_lattice,
+    lattice_autocorrelation,
+};
+
+type Basis = [[f64; 2]; 2];
+
+const SIZE: (usize, usize) = (220, 260);
+
+fn uniform(rng: &mut Rng) -> f64 {
+    f64::from(rng.next_u32()) / f64::from(u32::MAX)
+}
+
+/// A smooth random pattern that repeats by a basis: a few waves of random phases.
+fn pattern(basis: Basis, seed: u64) -> impl Fn(f64, f64) -> f64 {
+    let mut rng = Rng::new(seed, 0, 0, 0);
+    let mut waves = Vec::new();
+    for i in -3..=3 {
+        for j in 0..=3 {
+            let strength = 1.0 / f64::from(1 + i * i + j * j);
+            waves.push((f64::from(i), f64::from(j), strength, uniform(&mut rng)));
+        }
+    }
+    let [[a, b], [c, d]] = basis;
+    let det = a * d - b * c;
+    move |y, x| {
+        let (u, v) = ((x * d - y * c) / det, (y * a - x * b) / det);
+        let wave = |&(i, j, s, p): &(f64, f64, f64, f64)| {
+            s * ((i * u + j * v + p) * std::f64::consts::TAU).cos()
+        };
+        waves.iter().map(wave).sum()
+    }
+}
+
+/// A grey picture of what `value` (about -2 to 2) says, with noise.
+fn picture((h, w): (usize, usize), noise: f64, value: impl Fn(f64, f64) -> f64) -> Picture {
+    let mut rng = Rng::new(99, 0, 0, 0);
+    let sample = |i: usize| {
+        let v = value((i / w) as f64, (i % w) as f64) + noise * (uniform(&mut rng) - 0.5) * 3.46;
+        (128.0 + 40.0 * v).clamp(0.0, 255.0) as u8
+    };
+    let samples = Samples::U8((0..h * w).map(sample).collect());
+    Picture::new(h, w, 1, samples, Encoding::Srgb).expect("valid")
+}
+
+fn detect(picture: &Picture) -> Lattice {
+    let ctx = Ctx::new(0, 2).expect("pool");
+    detect_lattice(&ctx, picture, &LatticeParams::default()).expect("a lattice or a guess")
+}
+
+/// Whether both bases generate the same points: each vector of one is, within `tolerance`, a whole
+/// combination of the other's, by a matrix of determinant 1 or -1.
+fn same(got: &Lattice, [[a, b], [c, d]]: Basis, tolerance: f64) -> bool {
+    let det = a * d - b * c;
+    let whole = [got.v1, got.v2].map(|[x, y]| {
+        let (u, v) = (((x * d - y * c) / det).round(), ((y * a - x * b) / det).round());
+        let off = (u * a + v * c - x).hypot(u * b + v * d - y);
+        (off <= tolerance).then_some((u, v))
+    });
+    matches!(whole, [Some((p, q)), Some((r, s))] if (p * s - q * r).abs() == 1.0)
+}
+
+const BASES: [Basis; 6] = [
+    [[24.0, 0.0], [0.0, 31.0]],
+    [[36.5, 0.0], [-8.9, 13.4]],
+    [[16.3, 16.1], [-16.1, 16.3]],
+    [[40.0, 7.0], [20.0, 38.3]],
+    [[12.2, 3.1], [-4.4, 25.0]],
+    // About 2.2 x 2 repeats.
+    [[100.0, 10.0], [-9.0, 98.0]],
+];
+
+#[test]
+fn known_lattices_are_found_to_a_fraction_of_a_pixel() {
+    for (i, basis) in BASES.into_iter().enumerate() {
+        for noise in [0.0, 0.5] {
+            let got = detect(&picture(SIZE, noise, pattern(basis, i as u64)));
+            assert!(got.found, "{basis:?}, noise {noise}: {got:?}");
+            let exact = if basis[0][0] < 50.0 { 0.4 } else { 0.8 };
+            assert!(same(&got, basis, exact), "{basis:?}, noise {noise}: {got:?}");
+        }
+    }
+}
+
+#[test]
+fn rows_of_bricks_are_not_taken_for_the_lattice() {
+    // Running bond: mortar lines alone correlate along the whole rows.
+    let mortar = |y: f64, x: f64| {
+        let shift = if (y / 14.0) as i64 % 2 == 0 { 0.0 } else { 18.0 };
+        if y % 14.0 < 2.5 || (x + shift) % 36.0 < 2.5 { 1.5 } else { -0.5 }
+    };
+    let got = detect(&picture(SIZE, 0.8, mortar));
+    assert!(got.found && same(&got, [[36.0, 0.0], [18.0, 14.0]], 0.5), "{got:?}");
+}
+
+#[test]
+fn gradients_stains_and_scratches_do_not_matter() {
+    let basis = BASES[3];
+    let plain = pattern(basis, 3);
+    let dirty = |y: f64, x: f64| {
+        let stain = if (y - 90.0).hypot(x - 60.0) < 40.0 { 0.4 } else { 1.0 };
+        let scratch = if (y - 0.3 * x - 80.0).abs() < 2.0 { 3.0 } else { 0.0 };
+        plain(y, x) * stain * (0.3 + 0.7 * x / 260.0) + 2.0 * y / 220.0 - 1.0 + scratch
+    };
+    let got = detect(&picture(SIZE, 0.3, dirty));
+    assert!(got.found && same(&got, basis, 0.5), "{got:?}");
+}
+
+#[test]
+fn what_has_no_lattice_gets_none() {
+    // Bumps and dents at random places: blobs without order.
+    let blobs = |seed: u64| {
+        let mut rng = Rng::new(seed, 1, 0, 0);
+        let mut bump =
+            |_| [uniform(&mut rng) * 220.0, uniform(&mut rng) * 260.0, uniform(&mut rng) - 0.5];
+        let bumps: Vec<[f64; 3]> = (0..700).map(&mut bump).collect();
+        move |y: f64, x: f64| {
+            let bump = |b: &[f64; 3]| {
+                let far = (y - b[0]).powi(2) + (x - b[1]).powi(2);
+                if far < 400.0 { 3.0 * b[2] * (-far / 50.0).exp() } else { 0.0 }
+            };
+            bumps.iter().map(bump).sum()
+        }
+    };
+    for seed in 0..6 {
+        let got = detect(&picture(SIZE, 0.3, blobs(seed)));
+        assert!(!got.found, "blobs {seed}: {got:?}");
+    }
+    let noise = detect(&picture(SIZE, 1.0, |_, _| 0.0));
+    assert!(!noise.found, "noise: {noise:?}");
+    let stripes = detect(&picture(SIZE, 0.5, |y, x| ((y + 0.3 * x) / 4.0).sin()));
+    assert!(!stripes.found, "stripes: {stripes:?}");
+}
+
+#[test]
+fn several_lattices_get_no_confidence() {
+    let parts = [BASES[0], BASES[2], BASES[3], [[29.0, 11.0], [-13.0, 27.0]]];
+    let parts: Vec<_> = parts.into_iter().zip(7..).map(|(b, seed)| pattern(b, seed)).collect();
+    let quarters =
+        |y: f64, x: f64| parts[usize::from(y > 110.0) * 2 + usize::from(x > 130.0)](y, x);
+    let whole = detect(&picture(SIZE, 0.0, &parts[0]));
+    let got = detect(&picture(SIZE, 0.0, quarters));
+    assert!(!got.found && got.confidence < 0.5 * whole.confidence, "{got:?}");
+}
+
+#[test]
+fn a_transposed_picture_has_the_transposed_lattice() {
+    let basis = BASES[1];
+    let plain = pattern(basis, 1);
+    let got = detect(&picture((SIZE.1, SIZE.0), 0.4, |y, x| plain(x, y)));
+    assert!(got.found && same(&got, basis.map(|[x, y]| [y, x]), 0.4), "{got:?}");
+}
+
+#[test]
+fn a_fine_pattern_can_be_left_out() {
+    let (weave, print) =
+        (pattern([[6.0, 0.0], [0.0, 6.0]], 1), pattern([[48.0, 0.0], [0.0, 42.0]], 2));
+    let cloth = picture(SIZE, 0.1, |y, x| weave(y, x) + 0.3 * print(y, x));
+    let ctx = Ctx::new(0, 2).expect("pool");
+    let params = LatticeParams { min_period: 20.0, ..Default::default() };
+    let got = detect_lattice(&ctx, &cloth, &params).expect("found");
+    assert!(got.found && same(&got, [[48.0, 0.0], [0.0, 42.0]], 0.5), "{got:?}");
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same() {
+    let photo = picture(SIZE, 0.4, pattern(BASES[3], 3));
+    let with = |threads| {
+        let ctx = Ctx::new(0, threads).expect("pool");
+        let lattice = detect_lattice(&ctx, &photo, &LatticeParams::default()).expect("found");
+        (lattice, lattice_autocorrelation(&ctx, &photo).expect("map"))
+    };
+    let one = with(1);
+    assert!(one == with(2) && one == with(5));
+}
+
+#[test]
+fn the_map_shows_the_lattice() {
+    let photo = picture(SIZE, 0.2, pattern(BASES[0], 3));
+    let (map, scale) =
+        lattice_autocorrelation(&Ctx::new(0, 2).expect("pool"), &photo).expect("map");
+    assert_eq!((map.height(), map.width(), map.channels()), (2 * SIZE.0 - 1, 2 * SIZE.1 - 1, 1));
+    assert_eq!(scale, [1.0, 1.0]);
+    let at = |dy: isize, dx: isize| {
+        let (y, x) = (SIZE.0 as isize - 1 + dy, SIZE.1 as isize - 1 + dx);
+        map.samples().unit(y as usize * map.width() + x as usize)
+    };
+    assert!(at(0, 0) > 0.999 && at(31, 24) > 0.7 && at(31, -48) > 0.7 && at(15, 12) < 0.5);
+}
+
+#[test]
+fn bad_pictures_are_refused_with_the_reason() {
+    let ctx = Ctx::new(0, 1).expect("pool");
+    let error = |picture: &Picture| {
+        detect_lattice(&ctx, picture, &LatticeParams::default()).expect_err("refused")
+    };
+    let constant = picture(SIZE, 0.0, |_, _| 0.3);
+    assert!(matches!(error(&constant), Error::BadPicture { .. }));
+    assert!(matches!(lattice_autocorrelation(&ctx, &constant), Err(Error::BadPicture { .. })));
+    assert!(matches!(error(&picture((15, 80), 1.0, |_, _| 0.0)), Error::TooSmall { need: 16, .. }));
+    let mut samples = vec![0.5f32; 40 * 40];
+    samples[7] = f32::NAN;
+    let nan = Picture::new(40, 40, 1, Samples::F32(samples), Encoding::Linear).expect("valid");
+    assert!(matches!(error(&nan), Error::NotFinite { count: 1, .. }));
+    let params = LatticeParams { min_confidence: 1.5, ..Default::default() };
+    let photo = picture(SIZE, 0.2, pattern(BASES[0], 3));
+    assert!(matches!(detect_lattice(&ctx, &photo, &params), Err(Error::Parameter { .. })));
+    ctx.job().cancel();
+    let cancelled = detect_lattice(&ctx, &photo, &LatticeParams::default());
+    assert!(matches!(cancelled, Err(Error::Cancelled)));
+}
+
+#[test]
+fn transparent_pixels_do_not_count() {
+    let basis = BASES[3];
+    let photo = picture(SIZE, 0.2, pattern(basis, 3));
+    let Samples::U8(grey) = photo.samples() else { unreachable!("8-bit") };
+    // A third is hidden, and another lattice painted there.
+    let hidden = |i: usize| i % SIZE.1 < 90;
+    let other = picture(SIZE, 0.0, pattern(BASES[0], 5));
+    let pixel = |i: usize| {
+        if hidden(i) { [(other.samples().unit(i) * 255.0) as u8, 0] } else { [grey[i], 255] }
+    };
+    let samples = Samples::U8((0..grey.len()).flat_map(pixel).collect());
+    let masked = Picture::new(SIZE.0, SIZE.1, 2, samples, Encoding::Srgb).expect("valid");
+    let got = detect(&masked);
+    assert!(got.found && same(&got, basis, 0.5), "{got:?}");
+}
+
+#[test]
+fn the_program_tells_and_draws() {
+    use texforge::image::io::{self, WriteOptions};
+    let folder = tempfile::tempdir().expect("folder");
+    let write = |name: &str, picture: &Picture| {
+        let path = folder.path().join(name);
+        io::write(&path, picture, &WriteOptions::new(texforge::MapKind::Color)).expect("written");
+    };
+    write("wall.png", &picture(SIZE, 0.2, pattern(BASES[0], 3)));
+    write("noise.png", &picture(SIZE, 1.0, |_, _| 0.0));
+    write("flat.png", &picture(SIZE, 0.0, |_, _| 0.0));
+    let run = |args: &[&str]| {
+        let mut command = Command::cargo_bin("texforge").expect("built");
+        let output =
+            command.current_dir(folder.path()).arg("lattice").args(args).output().expect("ran");
+        let text = String::from_utf8(output.stdout).expect("UTF-8");
+        (output.status.code(), text, String::from_utf8(output.stderr).expect("UTF-8"))
+    };
+    let (status, text, _) =
+        run(&["wall.png", "--overlay", "drawn.png", "--autocorrelation", "map.png"]);
+    assert_eq!(status, Some(0));
+    assert!(
+        text.starts_with("lattice     found\n") && text.contains("\nv1          24.0"),
+        "{text}"
+    );
+    let sides = |name: &str| {
+        let read = io::read(&folder.path().join(name), texforge::MapKind::Data).expect("readable");
+        (read.height(), read.width(), read.channels())
+    };
+    assert_eq!(sides("drawn.png"), (SIZE.0, SIZE.1, 3));
+    assert_eq!(sides("map.png"), (2 * SIZE.0 - 1, 2 * SIZE.1 - 1, 1));
+    let (status, _, message) = run(&["wall.png", "--overlay", "drawn.png"]);
+    assert!(status == Some(1) && message.contains("exists already"), "{message}");
+
+    let (status, text, _) = run(&["noise.png"]);
+    assert!(status == Some(0) && text.contains("none found"), "{text}");
+    let (status, text, _) = run(&["noise.png", "--json"]);
+    let report: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    assert!(status == Some(0) && report["found"] == false && report["v1"].is_array(), "{report}");
+    let (status, _, message) = run(&["flat.png"]);
+    assert!(status == Some(1) && message.contains("all its usable pixels are alike"), "{message}");
+    let (status, _, _) = run(&["wall.png", "--min-confidence", "2"]);
+    assert_eq!(status, Some(2));
+}
