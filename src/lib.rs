@@ -39,7 +39,7 @@ pub use image::symmetry::Symmetry;
 pub use verb::inputs::Inputs;
 pub use verb::lattice::{Lattice, LatticeParams, detect_lattice, lattice_autocorrelation};
 pub use verb::palette::{Palette, palette};
-pub use verb::params::{Axis, Measure, Method, Quality, Size, Symmetries, TileParams};
+pub use verb::params::{Axis, Follow, Measure, Method, Quality, Size, Symmetries, TileParams};
 pub use verb::redo::Redo;
 pub use verb::texture_cost::{TextureCost, TextureCostParams, texture_cost};
 pub use verb::tile::{Costs, Report, Step, Tile, tile, tiles};

@@ -155,7 +155,7 @@ pub(crate) fn nearest(
     let mut field = Field::random(h, w, source, ctx.seed);
     let usage = PlaceCost::free(source);
     for i in 0..passes {
-        let search = Search { pass: i, radius: 0, n_random };
+        let search = Search { pass: i, radius: 0, n_random, phase: None };
         pass(ctx, target, source, &usage, OPEN, search, &mut field)?;
     }
     Ok(field)

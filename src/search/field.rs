@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use crate::base::rng::Rng;
+use crate::search::phase::Phase;
 use crate::search::source::Source;
 
 /// A patch position (its top left corner) in the source.
@@ -59,6 +60,17 @@ impl Field {
         const STAGE: u32 = 1;
         let item = |i: usize| source.random(&mut Rng::new(seed, STAGE, 0, i as u64));
         Self { height, width, pos: (0..height * width).into_par_iter().map(item).collect() }
+    }
+
+    /// The field with every match moved to the nearest place in phase with its pixel, where that is
+    /// usable.
+    #[must_use]
+    pub fn in_phase(self, phase: &Phase, source: &Source) -> Self {
+        let item = |(i, pos): (usize, Pos)| {
+            let near = phase.near(source, (i / self.width, i % self.width), pos);
+            if source.is_usable(near) { near } else { pos }
+        };
+        Self { pos: self.pos.into_par_iter().enumerate().map(item).collect(), ..self }
     }
 
     /// The field of the next finer level, whose source is `source` and was `coarse`: each position

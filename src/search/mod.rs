@@ -4,6 +4,7 @@ pub mod atlas;
 pub mod field;
 pub mod patch;
 pub mod patchmatch;
+pub mod phase;
 pub mod place_cost;
 pub mod rarity;
 pub mod seams;

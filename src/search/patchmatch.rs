@@ -11,6 +11,7 @@ use crate::base::error::Result;
 use crate::base::rng::Rng;
 use crate::search::field::{Field, Pos};
 use crate::search::patch::{Kernel, MatchImage, WithKernel, with_kernel};
+use crate::search::phase::Phase;
 use crate::search::place_cost::PlaceCost;
 use crate::search::source::Source;
 
@@ -38,6 +39,8 @@ pub struct Search {
     pub radius: usize,
     /// Number of random candidates a pixel, at most 16; each has half the radius of the one before.
     pub n_random: u32,
+    /// The lattice that random candidates are moved to; what is in phase stays so when it propagates.
+    pub phase: Option<Phase>,
 }
 
 /// One pass over the field: every output position takes the best of its own match, the
@@ -233,6 +236,10 @@ impl Band<'_> {
             let y = y_low + rng.below((y_high - y_low + 1) as u32) as i32;
             let x = x_low + rng.below((x_high - x_low + 1) as u32) as i32;
             *out = Pos::new(y as usize, x as usize);
+            if let Some(phase) = &self.search.phase {
+                let pixel = (item / self.field.width, item % self.field.width);
+                *out = phase.near(self.source, pixel, *out);
+            }
         }
     }
 

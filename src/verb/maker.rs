@@ -14,12 +14,13 @@ use crate::image::picture::Picture;
 use crate::image::sigma_map::SigmaMap;
 use crate::image::sourcemap::SourceMap;
 use crate::method::make_seamless;
-use crate::method::stationary::{self, Dial, Evenness, Exemplar, Kept};
+use crate::method::stationary::{self, Dial, Evenness, Exemplar, Kept, Periods};
 use crate::search::patchmatch::Wrap;
 use crate::signal::measure::Statistic;
 use crate::signal::window::Domain;
 use crate::verb::inputs::Inputs;
-use crate::verb::params::{Axis, Measure, Method, Quality, Size, Symmetries, TileParams};
+use crate::verb::lattice::{LatticeParams, detect_lattice};
+use crate::verb::params::{Axis, Follow, Measure, Method, Quality, Size, Symmetries, TileParams};
 use crate::verb::tile::{Costs, MAX_VARIANTS, Report, Step, Tile};
 
 /// Longest side of a tile, in pixels.
@@ -59,10 +60,20 @@ impl<'a> Maker<'a> {
         count: usize,
     ) -> Result<Self> {
         let start = Instant::now();
-        let (width, height) = check(inputs, params, count)?;
+        let (mut width, mut height) = check(inputs, params, count)?;
+        let mut notes = Vec::new();
+        let mut periods = None;
+        if params.lattice == Follow::Auto {
+            let followed = follow(ctx, inputs, params, (width, height), &mut notes)?;
+            if let Some((size, found)) = followed {
+                let size = Size::Pixels { width: size.0, height: size.1 };
+                // The size may have changed; it must do like any other.
+                (width, height) = check(inputs, &TileParams { size, ..params.clone() }, count)?;
+                periods = Some(found);
+            }
+        }
         let wrap = Wrap { y: params.axis != Axis::X, x: params.axis != Axis::Y };
         let masks = inputs.usable(params)?;
-        let mut notes = Vec::new();
         if masks[0].is_some() && params.method == Method::MakeSeamless {
             notes.push(
                 "the method make-seamless uses the whole photo; the mask is ignored".to_owned(),
@@ -72,6 +83,7 @@ impl<'a> Maker<'a> {
             notes.push("nothing is made stationary; the sigma map changes no pixel".to_owned());
         }
         let mut plan = plan(params, inputs.sigma_map, (height, width), wrap);
+        plan.periods = periods;
         if params.band > 0 {
             let photo = (inputs.photo.height(), inputs.photo.width());
             let usable = masks[0].as_ref().map(Mask::usable);
@@ -212,6 +224,20 @@ fn check(inputs: &Inputs<'_>, params: &TileParams, count: usize) -> Result<(usiz
         let expected = "left out unless the measure is `moments`";
         return Err(Error::parameter("order", expected, params.order));
     }
+    if params.lattice == Follow::Auto {
+        let refused = |expected: &str| Err(Error::parameter("lattice", expected, "auto"));
+        if params.method != Method::Stationary {
+            return refused("off unless the method is stationary");
+        }
+        if !inputs.also.is_empty() || params.symmetry != Symmetries::None {
+            return refused(
+                "off with further photos or symmetries, which have lattices of their own",
+            );
+        }
+        if params.band > 0 {
+            return refused("off with a band, which keeps the photo's own periods");
+        }
+    }
     let photo = inputs.photo;
     let (width, height) = match &inputs.redo {
         Some(redo) => redo.tile_size(params)?,
@@ -297,6 +323,47 @@ fn check(inputs: &Inputs<'_>, params: &TileParams, count: usize) -> Result<(usiz
     Ok((width, height))
 }
 
+/// Looks for the photo's lattice: the width and height of a tile of whole periods, and how it is made
+/// of them; `None` if there is none to follow. `notes` say which.
+fn follow(
+    ctx: &Ctx,
+    inputs: &Inputs<'_>,
+    params: &TileParams,
+    (width, height): (usize, usize),
+    notes: &mut Vec<String>,
+) -> Result<Option<((usize, usize), Periods)>> {
+    let lattice = match detect_lattice(ctx, inputs.photo, &LatticeParams::default()) {
+        Ok(lattice) => lattice,
+        Err(error @ (Error::Cancelled | Error::Memory { .. })) => return Err(error),
+        Err(error) => {
+            notes.push(format!("no lattice is followed: {error}"));
+            return Ok(None);
+        }
+    };
+    let confidence = lattice.confidence;
+    if !lattice.found {
+        notes.push(format!("no lattice is followed: none was found (confidence {confidence:.2})"));
+        return Ok(None);
+    }
+    let [[ax, ay], [bx, by]] = [lattice.v1, lattice.v2];
+    let vectors = format!(
+        "the photo repeats by ({ax:.1}, {ay:.1}) and ({bx:.1}, {by:.1}) pixels (confidence \
+         {confidence:.2})"
+    );
+    let fixed = params.size != Size::Auto || inputs.redo.is_some();
+    let snap = lattice.snap(width, height);
+    let Some(snap) = snap.filter(|s| !fixed || (s.width, s.height) == (width, height)) else {
+        let whole = snap.map_or(String::new(), |s| format!("; {}x{} does", s.width, s.height));
+        notes.push(format!(
+            "{vectors}; {width}x{height} holds no whole periods, so they are not followed{whole}"
+        ));
+        return Ok(None);
+    };
+    notes.push(format!("{vectors}; a tile of {}x{} holds whole periods", snap.width, snap.height));
+    let periods = Periods { vectors: [lattice.v1, lattice.v2], of_output: snap.periods };
+    Ok(Some(((snap.width, snap.height), periods)))
+}
+
 /// Checks that the dial has something to turn, and that nothing else turns it.
 fn check_dial(inputs: &Inputs<'_>, params: &TileParams, stationarity: f32) -> Result<()> {
     let refused = |expected: &str| Err(Error::parameter("stationarity", expected, stationarity));
@@ -365,6 +432,7 @@ fn plan(
         patch: params.patch,
         uniformity: params.uniformity,
         rarity: if even { params.rarity } else { 0.0 },
+        periods: None,
         kept: None,
         coarse_iterations,
         fine_iterations,

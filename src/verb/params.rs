@@ -111,6 +111,16 @@ choice! {
     }
 }
 
+choice! {
+    /// Whether the tile follows the photo's lattice.
+    pub enum Follow {
+        /// No lattice is looked for.
+        Off = "off",
+        /// One is looked for, and followed if it is found.
+        Auto = "auto",
+    }
+}
+
 impl Symmetries {
     /// All that are in it; the first is the photo as it lies.
     pub fn list(self) -> &'static [Symmetry] {
@@ -155,6 +165,8 @@ params! {
         flatten: f32 = 0.0, in 0.0..=1.0, unit "fraction of the photo's shorter side";
         /// Whether patches are also used mirrored left to right, turned by quarters, or both: more to choose from, but light then falls from several sides.
         symmetry: Symmetries = Symmetries::None;
+        /// Whether to look for a lattice (bricks, tiles, weave) and follow it: the tile then holds whole periods, and what is copied stays in step. For the method stationary, one photo as it lies.
+        lattice: Follow = Follow::Off;
         /// Keep the photo's middle as it is, pixel for pixel, and make only a border of this width anew, so that it repeats; 0 makes all anew.
         band: usize = 0, in 0..=8192, unit "px";
     }

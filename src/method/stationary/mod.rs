@@ -21,8 +21,10 @@ use crate::search::atlas::Atlas;
 use crate::search::field::{Field, Pos};
 use crate::search::patch::MatchImage;
 use crate::search::patchmatch::{self, Search, Wrap};
+use crate::search::phase::{Phase, Vectors};
 use crate::search::place_cost::PlaceCost;
 use crate::search::seams;
+use crate::search::source::Source;
 use crate::search::vote::{Votes, vote};
 use crate::signal::histogram::{Distribution, SOFT_BITS};
 use crate::signal::measure::Statistic;
@@ -70,12 +72,45 @@ pub struct Plan {
     pub uniformity: f32,
     /// How much rare places cost, as a share of what they are rarer than others.
     pub rarity: f32,
+    /// The lattice of the (only) photo, which the output repeats in.
+    pub periods: Option<Periods>,
     /// Output pixels that are given.
     pub kept: Option<Kept>,
     /// Iterations at the coarsest level.
     pub coarse_iterations: u32,
     /// Iterations at each other level.
     pub fine_iterations: u32,
+}
+
+/// A lattice in the photo, and how the output's axes are made of it.
+#[derive(Debug, Clone, Copy)]
+pub struct Periods {
+    /// Vectors in pixels of the photo, each to the right and downwards.
+    pub vectors: Vectors,
+    /// Coefficients of the displacements by the output's width and by its height.
+    pub of_output: [[i64; 2]; 2],
+}
+
+impl Periods {
+    /// The lattice at a level with an output of `size`, in a source of one view.
+    fn at_level(
+        &self,
+        photo: (usize, usize),
+        size: (usize, usize),
+        source: &Source,
+    ) -> Option<Phase> {
+        let view = source.atlas.views()[0].size;
+        let (sy, sx) = (view.0 as f64 / photo.0 as f64, view.1 as f64 / photo.1 as f64);
+        let vectors = self.vectors.map(|[x, y]| [x * sx, y * sy]);
+        // Cells of the output: its sides are whole combinations of them.
+        let [[a, b], [c, d]] = self.of_output.map(|row| row.map(|n| n as f64));
+        let (w, h, n) = (size.1 as f64, size.0 as f64, a * d - b * c);
+        if n == 0.0 {
+            return None;
+        }
+        let output = [[d * w / n, -b * h / n], [-c * w / n, a * h / n]];
+        Phase::new(vectors, output, source.patch)
+    }
 }
 
 /// What is made equal everywhere, and within which reach.
@@ -233,6 +268,10 @@ fn synthesize(
         if let Some(kept) = &kept {
             kept.hold(&mut f);
         }
+        let phase = plan.periods.and_then(|p| p.at_level(exemplar.sizes[0], (h, w), &level.source));
+        if let Some(phase) = &phase {
+            f = f.in_phase(phase, &level.source);
+        }
         let coarsest = j == n_coarse;
         let mut usage = PlaceCost::of_usage(&f, &level.source, plan.uniformity * level.usage_unit);
         let areas = balance::areas(&level.source, exemplar.sizes.len());
@@ -270,7 +309,7 @@ fn synthesize(
                 Some(more) => cost.plus(1.0, more),
                 None => cost,
             };
-            let search = Search { pass, ..search };
+            let search = Search { pass, phase, ..search };
             let unit = f64::from(plan.uniformity) * level.patch_variance;
             let cost = match balance.costs(&f, &level.source, &areas, unit) {
                 Some(costs) => cost.with_picture_costs(&level.source, &costs),
@@ -346,11 +385,11 @@ pub fn memory_bytes(
 fn effort(plan: &Plan, level: &Level, coarsest: bool) -> (u32, Search) {
     let finest = level.size == plan.size;
     if finest && !coarsest {
-        (plan.fine_iterations.div_ceil(2), Search { pass: 0, radius: 32, n_random: 2 })
+        (plan.fine_iterations.div_ceil(2), Search { pass: 0, radius: 32, n_random: 2, phase: None })
     } else if coarsest {
-        (plan.coarse_iterations, Search { pass: 0, radius: 0, n_random: 8 })
+        (plan.coarse_iterations, Search { pass: 0, radius: 0, n_random: 8, phase: None })
     } else {
-        (plan.fine_iterations, Search { pass: 0, radius: 32, n_random: 2 })
+        (plan.fine_iterations, Search { pass: 0, radius: 32, n_random: 2, phase: None })
     }
 }
 

@@ -1,0 +1,157 @@
+//! [`Phase`]: which places of a source continue the lattice that the output repeats in.
+
+use crate::search::field::Pos;
+use crate::search::source::Source;
+
+/// Two vectors, each to the right and downwards.
+pub type Vectors = [[f64; 2]; 2];
+
+/// How far from its place in the cell a match may lie, as a share of the shorter vector: bricks are
+/// not laid to the pixel.
+const TOLERANCE: f64 = 0.03;
+
+/// The same in pixels, at least: positions are whole pixels.
+const TOLERANCE_PIXELS: f64 = 1.0;
+
+/// A lattice in a source and the same lattice in the output, where it may be a little stretched: a
+/// match is in phase if it lies at the same place of a cell as its pixel does.
+#[derive(Debug, Clone, Copy)]
+pub struct Phase {
+    /// The lattice's vectors in the source, in its pixels.
+    source: Vectors,
+    /// Coefficients of a place in the source, and of one in the output, row by row.
+    of_source: Vectors,
+    of_output: Vectors,
+    /// From a patch's corner to its middle.
+    half: f64,
+    /// Square of the distance that counts as in phase.
+    tolerance: f64,
+}
+
+impl Phase {
+    /// The lattice of the vectors `source` in the source's pixels and `output` in the output's, for
+    /// patches of side `patch`. `None` if two vectors are parallel.
+    pub fn new(source: Vectors, output: Vectors, patch: usize) -> Option<Self> {
+        let shorter = source.map(|[x, y]| x.hypot(y)).into_iter().fold(f64::MAX, f64::min);
+        let tolerance = (TOLERANCE * shorter).max(TOLERANCE_PIXELS);
+        Some(Self {
+            source,
+            of_source: inverse(source)?,
+            of_output: inverse(output)?,
+            half: (patch / 2) as f64,
+            tolerance: tolerance * tolerance,
+        })
+    }
+
+    /// The place in phase with output pixel (`y`, `x`) that is nearest to `pos` (nearly: by rounding
+    /// coefficients); `pos` itself if it is in phase, or if the source has no such place around it.
+    #[inline]
+    pub fn near(&self, source: &Source, (y, x): (usize, usize), pos: Pos) -> Pos {
+        let center = [pos.x() as f64 + self.half, pos.y() as f64 + self.half];
+        let there = combined(self.of_source, center);
+        let here = combined(self.of_output, [x as f64, y as f64]);
+        // By how much of a cell it is off.
+        let off: [f64; 2] = std::array::from_fn(|k| {
+            let apart = there[k] - here[k];
+            apart - apart.round()
+        });
+        let moved = |off: [f64; 2]| {
+            let [v1, v2] = self.source;
+            [v1[0] * off[0] + v2[0] * off[1], v1[1] * off[0] + v2[1] * off[1]]
+        };
+        let [dx, dy] = moved(off);
+        if dx * dx + dy * dy <= self.tolerance {
+            return pos;
+        }
+        // The nearest first; at the source's border a cell farther in.
+        for [a, b] in [[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [-1, -1], [1, -1], [-1, 1]]
+        {
+            let [dx, dy] = moved([off[0] + f64::from(a), off[1] + f64::from(b)]);
+            let (px, py) = ((pos.x() as f64 - dx).round(), (pos.y() as f64 - dy).round());
+            let inside = |p: f64, n: usize| p >= 0.0 && p < n as f64;
+            if inside(px, source.cols()) && inside(py, source.rows()) {
+                return Pos::new(py as usize, px as usize);
+            }
+        }
+        pos
+    }
+}
+
+/// The matrix that gives the coefficients of a place in two vectors, row by row.
+fn inverse([[ax, ay], [bx, by]]: Vectors) -> Option<Vectors> {
+    let area = ax * by - ay * bx;
+    (area.abs() > 1e-9).then(|| [[by / area, -bx / area], [-ay / area, ax / area]])
+}
+
+/// The coefficients of a place.
+fn combined([a, b]: Vectors, [x, y]: [f64; 2]) -> [f64; 2] {
+    [a[0] * x + a[1] * y, b[0] * x + b[1] * y]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::search::patch::MatchImage;
+    use proptest::prelude::*;
+
+    fn source() -> Source {
+        Source::new(MatchImage::new(200, 240), 11, None).expect("a source")
+    }
+
+    /// How far `pos` is from the nearest of all places in phase, by trying them all.
+    fn off(source: Vectors, output: Vectors, (y, x): (usize, usize), pos: Pos) -> f64 {
+        // The output's pixel in cells, and from there all places of the source.
+        let area = output[0][0] * output[1][1] - output[0][1] * output[1][0];
+        let (fx, fy) = (x as f64, y as f64);
+        let a = (fx * output[1][1] - fy * output[1][0]) / area;
+        let b = (fy * output[0][0] - fx * output[0][1]) / area;
+        let mut least = f64::MAX;
+        for i in -60..=60 {
+            for j in -60..=60 {
+                let (a, b) = (a + f64::from(i), b + f64::from(j));
+                let to_x = a * source[0][0] + b * source[1][0] - (pos.x() as f64 + 5.0);
+                let to_y = a * source[0][1] + b * source[1][1] - (pos.y() as f64 + 5.0);
+                least = least.min(to_x.hypot(to_y));
+            }
+        }
+        least
+    }
+
+    proptest! {
+        #[test]
+        fn what_is_found_is_in_phase_and_near(
+            (y, x) in (0..160usize, 0..160usize),
+            (py, px) in (0..190usize, 0..230usize),
+            (angle, skew, longer) in (-0.5..0.5f64, -0.4..0.4f64, 1.0..1.5f64),
+        ) {
+            let v1 = [30.0 * angle.cos(), 30.0 * angle.sin()];
+            let v2 = [longer * (-v1[1] + skew * v1[0]), longer * (v1[0] + skew * v1[1])];
+            let lattice = [v1, v2];
+            // The output's is stretched a little.
+            let output = lattice.map(|[x, y]| [1.02 * x, 0.99 * y]);
+            let phase = Phase::new(lattice, output, 11).expect("a lattice");
+            let source = source();
+            let pos = Pos::new(py, px);
+            let near = phase.near(&source, (y, x), pos);
+            // Rounded to pixels.
+            prop_assert!(off(lattice, output, (y, x), near) <= 1.0, "{pos:?} {near:?}");
+            let moved = (near.x() as f64 - px as f64).hypot(near.y() as f64 - py as f64);
+            let inner = (60..130).contains(&py) && (60..170).contains(&px);
+            // A cell's half diagonal; at the border a cell farther.
+            prop_assert!(moved <= if inner { 45.0 } else { 130.0 }, "{pos:?} {near:?}");
+            // And it stays.
+            prop_assert_eq!(phase.near(&source, (y, x), near), near);
+        }
+    }
+
+    #[test]
+    fn neighbours_in_phase_agree() {
+        let phase = Phase::new([[40.0, 0.0], [20.0, 30.0]], [[40.0, 0.0], [20.0, 30.0]], 11);
+        let phase = phase.expect("a lattice");
+        let source = source();
+        let pos = phase.near(&source, (50, 70), Pos::new(91, 133));
+        let beside = pos.shifted(1, 1, &source).expect("inside");
+        assert_eq!(phase.near(&source, (51, 71), beside), beside);
+        assert!(Phase::new([[4.0, 2.0], [2.0, 1.0]], [[4.0, 0.0], [0.0, 4.0]], 11).is_none());
+    }
+}
