@@ -183,7 +183,7 @@ impl Scene {
         });
         let field = if coherent { quilt } else { Field::random(SIDE, SIDE, &source, 6) };
         let usage = PlaceCost::of_usage(&field, &source, 500.0);
-        let search = Search { pass: 0, radius: 32, n_random: 2 };
+        let search = Search { pass: 0, radius: 32, n_random: 2, phase: None };
         Self { source, target, usage, wrap: TORUS, search, field }
     }
 

@@ -1,5 +1,7 @@
 //! [`detect_lattice`]: by which displacements a near-regular photo repeats.
 
+use rayon::prelude::*;
+
 use crate::analyze::lattice::basis::{Basis, area};
 use crate::analyze::lattice::snap::{self, Snap};
 use crate::analyze::lattice::{self, reduced_size};
@@ -96,10 +98,20 @@ impl Lattice {
 /// pixels are alike, [`Error::NotFinite`], [`Error::Memory`], [`Error::Cancelled`].
 pub fn detect_lattice(ctx: &Ctx, photo: &Picture, params: &LatticeParams) -> Result<Lattice> {
     params.validate()?;
-    let (pixels, mask) = prepared(photo)?;
+    detect(ctx, photo, params, false)
+}
+
+/// The same with default parameters, quick where hardly anything repeats: there the guess is that of
+/// the coarsest scale.
+pub(super) fn glanced(ctx: &Ctx, photo: &Picture) -> Result<Lattice> {
+    detect(ctx, photo, &LatticeParams::default(), true)
+}
+
+fn detect(ctx: &Ctx, photo: &Picture, params: &LatticeParams, hurried: bool) -> Result<Lattice> {
+    let (pixels, mask) = ctx.install(|| prepared(photo))?;
     let size = (photo.height(), photo.width());
     let least = f64::from(params.min_period);
-    let found = ctx.install(|| lattice::find(ctx, &pixels, size, mask.as_ref(), least))?;
+    let found = ctx.install(|| lattice::find(ctx, &pixels, size, mask.as_ref(), least, hurried))?;
     let confidence = found.map_or(0.0, |f| f.confidence);
     // Without any candidate the guess is that nothing repeats.
     let nothing = [[size.1 as f64, 0.0], [0.0, size.0 as f64]];
@@ -127,7 +139,7 @@ pub fn detect_lattice(ctx: &Ctx, photo: &Picture, params: &LatticeParams) -> Res
 /// # Errors
 /// As [`detect_lattice`].
 pub fn lattice_autocorrelation(ctx: &Ctx, photo: &Picture) -> Result<(Picture, [f64; 2])> {
-    let (pixels, mask) = prepared(photo)?;
+    let (pixels, mask) = ctx.install(|| prepared(photo))?;
     let size = (photo.height(), photo.width());
     let small = reduced_size(size, MAP_SIDE);
     let gamma = ctx.install(|| {
@@ -162,8 +174,8 @@ fn prepared(photo: &Picture) -> Result<(Vec<[f32; 3]>, Option<Mask>)> {
     let pixels = (width * height) as u64;
     ensure_available("the lattice", Some(16 * pixels + 600 * pixels.min(1 << 20)))?;
     let model = ColorModel::new(photo);
-    let colors: Vec<[f32; 3]> =
-        (0..width * height).map(|i| model.matching_pixel(photo, i)).collect();
+    let mut colors = model.averaging_pixels(photo);
+    colors.par_chunks_mut(width).for_each(|row| model.space().convert_row(row));
     let mask = Mask::from_alpha(photo);
     let mut usable = (0..colors.len()).filter(|&i| mask.as_ref().is_none_or(|m| m.usable()[i]));
     let first = usable.next();

@@ -19,7 +19,7 @@ use crate::search::patchmatch::Wrap;
 use crate::signal::measure::Statistic;
 use crate::signal::window::Domain;
 use crate::verb::inputs::Inputs;
-use crate::verb::lattice::{LatticeParams, detect_lattice};
+use crate::verb::lattice::glanced;
 use crate::verb::params::{Axis, Follow, Measure, Method, Quality, Size, Symmetries, TileParams};
 use crate::verb::tile::{Costs, MAX_VARIANTS, Report, Step, Tile};
 
@@ -63,7 +63,7 @@ impl<'a> Maker<'a> {
         let (mut width, mut height) = check(inputs, params, count)?;
         let mut notes = Vec::new();
         let mut periods = None;
-        if params.lattice == Follow::Auto {
+        if can_follow(inputs, params) {
             let followed = follow(ctx, inputs, params, (width, height), &mut notes)?;
             if let Some((size, found)) = followed {
                 let size = Size::Pixels { width: size.0, height: size.1 };
@@ -224,20 +224,6 @@ fn check(inputs: &Inputs<'_>, params: &TileParams, count: usize) -> Result<(usiz
         let expected = "left out unless the measure is `moments`";
         return Err(Error::parameter("order", expected, params.order));
     }
-    if params.lattice == Follow::Auto {
-        let refused = |expected: &str| Err(Error::parameter("lattice", expected, "auto"));
-        if params.method != Method::Stationary {
-            return refused("off unless the method is stationary");
-        }
-        if !inputs.also.is_empty() || params.symmetry != Symmetries::None {
-            return refused(
-                "off with further photos or symmetries, which have lattices of their own",
-            );
-        }
-        if params.band > 0 {
-            return refused("off with a band, which keeps the photo's own periods");
-        }
-    }
     let photo = inputs.photo;
     let (width, height) = match &inputs.redo {
         Some(redo) => redo.tile_size(params)?,
@@ -323,8 +309,17 @@ fn check(inputs: &Inputs<'_>, params: &TileParams, count: usize) -> Result<(usiz
     Ok((width, height))
 }
 
+/// Whether there could be a lattice to follow.
+fn can_follow(inputs: &Inputs<'_>, params: &TileParams) -> bool {
+    params.lattice == Follow::Auto
+        && params.method == Method::Stationary
+        && params.band == 0
+        && params.symmetry == Symmetries::None
+        && inputs.also.is_empty()
+}
+
 /// Looks for the photo's lattice: the width and height of a tile of whole periods, and how it is made
-/// of them; `None` if there is none to follow. `notes` say which.
+/// of them; `None` if there is none to follow. `notes` say it if there is one.
 fn follow(
     ctx: &Ctx,
     inputs: &Inputs<'_>,
@@ -332,19 +327,15 @@ fn follow(
     (width, height): (usize, usize),
     notes: &mut Vec<String>,
 ) -> Result<Option<((usize, usize), Periods)>> {
-    let lattice = match detect_lattice(ctx, inputs.photo, &LatticeParams::default()) {
-        Ok(lattice) => lattice,
-        Err(error @ (Error::Cancelled | Error::Memory { .. })) => return Err(error),
-        Err(error) => {
-            notes.push(format!("no lattice is followed: {error}"));
-            return Ok(None);
+    let lattice = match glanced(ctx, inputs.photo) {
+        Ok(lattice) if lattice.found => lattice,
+        Err(error @ (Error::Cancelled | Error::Memory { .. } | Error::Internal { .. })) => {
+            return Err(error);
         }
+        // What is too small or too plain for a lattice has none.
+        Ok(_) | Err(_) => return Ok(None),
     };
     let confidence = lattice.confidence;
-    if !lattice.found {
-        notes.push(format!("no lattice is followed: none was found (confidence {confidence:.2})"));
-        return Ok(None);
-    }
     let [[ax, ay], [bx, by]] = [lattice.v1, lattice.v2];
     let vectors = format!(
         "the photo repeats by ({ax:.1}, {ay:.1}) and ({bx:.1}, {by:.1}) pixels (confidence \
@@ -355,7 +346,7 @@ fn follow(
     let Some(snap) = snap.filter(|s| !fixed || (s.width, s.height) == (width, height)) else {
         let whole = snap.map_or(String::new(), |s| format!("; {}x{} does", s.width, s.height));
         notes.push(format!(
-            "{vectors}; {width}x{height} holds no whole periods, so they are not followed{whole}"
+            "{vectors}; {width}x{height} holds no whole number of them, so some are cut{whole}"
         ));
         return Ok(None);
     };

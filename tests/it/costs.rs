@@ -329,6 +329,7 @@ mod trace {
             uniformity: params.uniformity,
             rarity: params.rarity,
             coarse_iterations: trace.iter().filter(|s| s.level == 1).count() as u32,
+            periods: None,
             kept: None,
             fine_iterations: 1,
         };
@@ -387,6 +388,7 @@ mod trace {
             uniformity: 1.0,
             rarity: 0.0,
             coarse_iterations: 5,
+            periods: None,
             kept: None,
             fine_iterations: 1,
         };

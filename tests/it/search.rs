@@ -272,7 +272,7 @@ mod fields {
     ) {
         ctx.install(|| {
             for pass in which {
-                let search = Search { pass, radius: 0, n_random };
+                let search = Search { pass, radius: 0, n_random, phase: None };
                 patchmatch::pass(ctx, target, source, usage, wrap, search, field)?;
             }
             Ok(())
@@ -499,7 +499,7 @@ mod fields {
         let mut field = random_field(20, 20, &source, 1);
         let ctx = ctx();
         ctx.job().cancel();
-        let search = Search { pass: 0, radius: 0, n_random: 1 };
+        let search = Search { pass: 0, radius: 0, n_random: 1, phase: None };
         let usage = PlaceCost::free(&source);
         let result = patchmatch::pass(&ctx, &target, &source, &usage, NONE, search, &mut field);
         assert!(matches!(result, Err(texforge::Error::Cancelled)), "{result:?}");

@@ -164,7 +164,7 @@ impl Plane {
 
     /// Linear between displacements; `None` beyond the rectangle.
     fn sample(&self, y: f64, x: f64) -> Option<f64> {
-        let (y0, x0) = (y.floor() as isize, x.floor() as isize);
+        let (y0, x0) = (floor(y), floor(x));
         let known = |v: isize, n: isize| -n <= v && v < n;
         if !known(y0, self.reach[0]) || !known(x0, self.reach[1]) {
             return None;
@@ -175,6 +175,14 @@ impl Plane {
         let bottom = at(1, 0) + (at(1, 1) - at(1, 0)) * fx;
         Some(top + (bottom - top) * fy)
     }
+}
+
+/// The largest whole number that is not above `v`. Without the call that `f64::floor` is where the
+/// processor is not known.
+#[inline]
+fn floor(v: f64) -> isize {
+    let toward_zero = v as isize;
+    toward_zero - isize::from(toward_zero as f64 > v)
 }
 
 /// The directions, as unit vectors (y, x), in which lines through the middle correlate best.

@@ -38,6 +38,10 @@ const FINER: f64 = 1.35;
 /// begin at 0.15.
 const EVEN: f64 = 0.11;
 
+/// Strength at the coarsest scale from which a finer look is worth its time. Measured: those of the
+/// finer scales are higher by a quarter at most.
+const GLANCE: f64 = 0.08;
+
 /// A candidate lattice and how well the picture repeats by it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Candidate {
@@ -68,7 +72,8 @@ pub struct Found {
 const STEPS: u64 = SIDES.len() as u64;
 
 /// The best lattice of a picture (`pixels`, `height` x `width`, of which `usable` count); `None` if
-/// there is no candidate at all. Periods shorter than `min_period` pixels do not count.
+/// there is no candidate at all. Periods shorter than `min_period` pixels do not count. `hurried`, it
+/// gives up after the coarsest scale if hardly anything repeats there.
 ///
 /// # Paper
 /// See `pairs::goodness` for what is compared.
@@ -81,6 +86,7 @@ pub fn find(
     (height, width): (usize, usize),
     usable: Option<&Mask>,
     min_period: f64,
+    hurried: bool,
 ) -> Result<Option<Found>> {
     ctx.begin(STEPS);
     let mut chosen: Option<Candidate> = None;
@@ -113,6 +119,9 @@ pub fn find(
             finest = Some((field, scale));
         }
         ctx.step(1)?;
+        if hurried && chosen.is_none_or(|c| c.strength < GLANCE) {
+            break;
+        }
     }
     Ok(chosen.zip(finest).map(|(found, (field, scale))| {
         let basis = refine::sharpened(&field, found.basis, scale).unwrap_or(found.basis);

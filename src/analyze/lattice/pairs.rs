@@ -202,11 +202,13 @@ pub(super) fn goodness(field: &Field, basis: Basis, prune: Option<Prune>) -> Opt
     if n < 3.0 {
         return None;
     }
-    let preference = cells.powf(ALPHA - 1.0);
-    let judged = |excess: f64, correlation: f64| {
-        let strength = (excess.max(0.0) * correlation.max(0.0)).sqrt() * n / (n + PRIOR);
-        (strength, libm::pow(strength * strength, ALPHA) * preference)
+    let preference = libm::pow(cells, ALPHA - 1.0);
+    let strength = |excess: f64, correlation: f64| {
+        (excess.max(0.0) * correlation.max(0.0)).sqrt() * n / (n + PRIOR)
     };
+    // The strength that a goodness needs; a little less, so that rounding gives nothing up.
+    let needed =
+        prune.map(|p| (p.bounds, libm::pow(p.least / preference, 0.5 / ALPHA) * (1.0 - 1e-9)));
     let total: f64 = multiples.iter().map(|&(_, v)| field.overlap(v)).sum();
     let (mut excess, mut squares, mut correlation, mut left) = (0.0, 0.0, 0.0, total);
     for &(_, v) in &multiples {
@@ -217,15 +219,16 @@ pub(super) fn goodness(field: &Field, basis: Basis, prune: Option<Prune>) -> Opt
         correlation += weight * c;
         left -= weight;
         let most = |sum: f64, bound: f64| (sum + left.max(0.0) * bound) / total;
-        if let Some(Prune { bounds, least }) = prune
-            && judged(most(excess, bounds[0]), most(correlation, bounds[1])).1 < least
+        if let Some((bounds, needed)) = needed
+            && strength(most(excess, bounds[0]), most(correlation, bounds[1])) < needed
         {
             return None;
         }
     }
     let (excess, correlation) = (excess / total, correlation / total);
     let error = ((squares / total - excess * excess).max(0.0) / (n - 1.0)).sqrt();
-    let (strength, goodness) = judged(excess - error, correlation);
+    let strength = strength(excess - error, correlation);
+    let goodness = libm::pow(strength * strength, ALPHA) * preference;
     (goodness > 0.0).then_some(Candidate { basis, goodness, strength, correlation })
 }
 
