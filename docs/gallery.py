@@ -132,7 +132,24 @@ def palette(photo: texforge.Image, seed: int, side: int) -> list[contact.Cell]:
     ]
 
 
-OPTIONS = {"gradients": gradient_of_sigma, "rarity": rarity, "palette": palette}
+def lattice(photo: texforge.Image, seed: int, side: int) -> list[contact.Cell]:
+    """Tile a photograph that repeats, in step with it and not, in the size that it chooses."""
+    del side
+    both: tuple[texforge.Follow, ...] = ("auto", "off")
+    step = [texforge.tile(photo, seed=seed, lattice=follow) for follow in both]
+    places = zip(both, step, strict=True)
+    return [
+        (f"lattice {follow}, {tile.image.shape[1]} x {tile.image.shape[0]}", repeated(tile))
+        for follow, tile in places
+    ]
+
+
+OPTIONS = {
+    "gradients": gradient_of_sigma,
+    "lattice": lattice,
+    "palette": palette,
+    "rarity": rarity,
+}
 """What an option does to every photo: a sheet of a class each."""
 
 

@@ -17,6 +17,7 @@ from texforge._types import (
     Axis,
     Costs,
     Encoding,
+    Follow,
     Image,
     ImageLike,
     MapKind,
@@ -55,6 +56,7 @@ def tile(
     avoid_grow: int = 0,
     flatten: float = 0.0,
     symmetry: Symmetries = "none",
+    lattice: Follow = "auto",
     band: int = 0,
     seed: int = 0,
     also: Sequence[ImageLike] | None = None,
@@ -82,7 +84,8 @@ def tile(
         255, 65535 or 1.0; floats may exceed it. Pixels that are not wholly opaque are never used.
     size : int or (int, int), optional
         **(height, width)** of the tile in pixels, as in ``image.shape``; one number makes a
-        square. By default the largest power of two that fits into the photo, at most 2048.
+        square. By default the largest power of two that fits into the photo, at most 2048, or
+        whole periods near it: see `lattice`.
     axis : {"both", "x", "y"}
         In which directions the tile repeats: ``"x"`` horizontally only, ``"y"`` vertically only.
     method : {"stationary", "wrap-only", "no-wrap", "make-seamless"}
@@ -124,6 +127,12 @@ def tile(
         Whether patches of the photo are also used mirrored left to right, turned by quarters, or
         both: more to choose from, but light then falls from several sides. Time and memory grow
         with it, up to eight photos'.
+    lattice : {"off", "auto"}
+        Whether a photo that repeats (bricks, tiles, weave) stays in step, as far as
+        `detect_lattice` finds its periods. The default size then is a whole number of them, and a
+        `size` that is one within 3 % is kept in step too; another cuts some, and a note in
+        ``tile.report["notes"]`` says which would do. For the method ``"stationary"``, of one
+        photo as it lies, without a band.
     band : int
         Width of the border that is made anew, in pixels, so that the photo repeats; its middle
         stays as it is, pixel for pixel. At least `patch`, at most 8192; 0 makes all anew. The tile

@@ -17,6 +17,7 @@ __all__ = [
     "Axis",
     "Costs",
     "Encoding",
+    "Follow",
     "Image",
     "ImageLike",
     "Lattice",
@@ -51,6 +52,8 @@ Quality: TypeAlias = Literal["draft"] | Literal["normal"] | Literal["best"]
 """How much time to spend."""
 Symmetries: TypeAlias = Literal["none"] | Literal["mirror"] | Literal["rotate"] | Literal["all"]
 """In which symmetries the photo's patches are used."""
+Follow: TypeAlias = Literal["off"] | Literal["auto"]
+"""Whether a tile follows the photo's lattice."""
 Encoding: TypeAlias = Literal["srgb"] | Literal["linear"] | Literal["data"]
 """What the numbers of a picture mean."""
 MapKind: TypeAlias = (
@@ -100,6 +103,7 @@ class TileOptions(TypedDict, total=False):
     avoid_grow: int
     flatten: float
     symmetry: Symmetries
+    lattice: Follow
     band: int
     seed: int
     also: Sequence[ImageLike] | None

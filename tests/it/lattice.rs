@@ -5,8 +5,8 @@ use std::process::Command;
 use assert_cmd::prelude::*;
 use texforge::base::rng::Rng;
 use texforge::{
-    Ctx, Encoding, Error, Lattice, LatticeParams, Picture, Samples, detect_lattice,
-    lattice_autocorrelation,
+    Ctx, Encoding, Error, Follow, Lattice, LatticeParams, Method, Picture, Samples, Size, Tile,
+    TileParams, detect_lattice, lattice_autocorrelation, tile,
 };
 
 type Basis = [[f64; 2]; 2];
@@ -276,4 +276,103 @@ fn the_program_tells_and_draws() {
     assert!(status == Some(1) && message.contains("all its usable pixels are alike"), "{message}");
     let (status, _, _) = run(&["wall.png", "--min-confidence", "2"]);
     assert_eq!(status, Some(2));
+}
+
+mod following {
+    use super::*;
+
+    /// Courses of bricks, each shifted by half a brick, with a stain.
+    const BRICKS: Basis = [[37.0, 0.0], [18.5, 21.0]];
+
+    fn wall() -> Picture {
+        let clean = pattern(BRICKS, 3);
+        picture(SIZE, 0.2, |y, x| {
+            let stain = if (y - 90.0).hypot(x - 160.0) < 30.0 { 1.2 } else { 0.0 };
+            clean(y, x) - stain
+        })
+    }
+
+    fn made(photo: &Picture, params: &TileParams, threads: usize) -> Tile {
+        tile(&Ctx::new(0, threads).expect("pool"), photo, None, params).expect("a tile")
+    }
+
+    /// The share of pixels whose match lies at the same place of a brick, within two pixels.
+    fn in_step(tile: &Tile) -> f64 {
+        let map = tile.source_map.as_ref().expect("a source map");
+        let (w, h) = (map.width() as f64, map.height() as f64);
+        // The lattice stretched to whole periods of the tile.
+        let (sx, sy) = (w / ((w / 37.0).round() * 37.0), h / ((h / 42.0).round() * 42.0));
+        let near = |(i, &[y, x]): (usize, &[u32; 2])| {
+            let (oy, ox) = ((i / map.width()) as f64 / sy, (i % map.width()) as f64 / sx);
+            let (dy, dx) = (f64::from(y) - oy, f64::from(x) - ox);
+            let course = (dy / 21.0).round();
+            let (off_y, along) = (dy - 21.0 * course, dx - 18.5 * course);
+            off_y.hypot(along - 37.0 * (along / 37.0).round()) <= 2.0
+        };
+        let positions = map.positions();
+        positions.iter().enumerate().filter(|&p| near(p)).count() as f64 / positions.len() as f64
+    }
+
+    #[test]
+    fn a_tile_of_bricks_holds_whole_bricks_in_step() {
+        let photo = wall();
+        let tile = made(&photo, &TileParams::default(), 2);
+        let (w, h) = tile.report.tile_size;
+        let whole = |n: usize, period: f64| {
+            let times = (n as f64 / period).round();
+            times >= 1.0 && (n as f64 / (times * period) - 1.0).abs() < 0.031
+        };
+        assert!(whole(w, 37.0) && whole(h, 42.0), "{w}x{h}");
+        assert!(tile.report.notes.iter().any(|n| n.contains("whole periods")), "it is said");
+        // Bricks of neighbouring phase fit as well when nothing holds them: a few do by themselves.
+        let size = Size::Pixels { width: w, height: h };
+        let off = TileParams { lattice: Follow::Off, size, ..Default::default() };
+        let free = in_step(&made(&photo, &off, 2));
+        assert!(in_step(&tile) > 0.9, "in step: {}", in_step(&tile));
+        assert!(free < 0.5, "in step without: {free}");
+        // The tile's own lattice is the photo's.
+        let found = detect(&tile.picture);
+        let stretched = BRICKS.map(|[x, y]| {
+            let (w, h) = (w as f64, h as f64);
+            [x * w / ((w / 37.0).round() * 37.0), y * h / ((h / 42.0).round() * 42.0)]
+        });
+        assert!(found.found && same(&found, stretched, 0.5), "{found:?}");
+        // That size asked for is the same tile, at any thread count.
+        for threads in [1, 5] {
+            let again = made(&photo, &TileParams { size, ..Default::default() }, threads);
+            assert!(again.picture.samples() == tile.picture.samples(), "{threads} threads");
+        }
+    }
+
+    #[test]
+    fn a_size_that_cuts_bricks_is_made_and_said() {
+        let photo = wall();
+        // Two bricks and a half.
+        let size = Size::Pixels { width: 92, height: 84 };
+        let params = TileParams { size, ..Default::default() };
+        let tile = made(&photo, &params, 2);
+        assert_eq!(tile.report.tile_size, (92, 84));
+        let said = tile.report.notes.iter().find(|note| note.contains("some are cut"));
+        assert!(said.is_some_and(|note| note.contains("x84 does")), "{:?}", tile.report.notes);
+        let off = made(&photo, &TileParams { lattice: Follow::Off, ..params }, 2);
+        assert!(off.picture.samples() == tile.picture.samples());
+        assert!(off.report.notes.is_empty());
+    }
+
+    #[test]
+    fn where_nothing_repeats_or_nothing_can_follow_nothing_changes() {
+        let noise = picture(SIZE, 1.0, |_, _| 0.0);
+        let draft = TileParams { quality: texforge::Quality::Draft, ..Default::default() };
+        let off = TileParams { lattice: Follow::Off, ..draft.clone() };
+        let (auto, plain) = (made(&noise, &draft, 2), made(&noise, &off, 2));
+        assert!(auto.picture.samples() == plain.picture.samples());
+        assert!(auto.report.notes.is_empty(), "{:?}", auto.report.notes);
+        // Baselines are not helped.
+        let photo = wall();
+        for method in [Method::WrapOnly, Method::NoWrap, Method::MakeSeamless] {
+            let tile = made(&photo, &TileParams { method, ..draft.clone() }, 2);
+            let plain = made(&photo, &TileParams { method, ..off.clone() }, 2);
+            assert!(tile.picture.samples() == plain.picture.samples(), "{method:?}");
+        }
+    }
 }
