@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::analyze::lattice::basis::{Basis, area};
-use crate::analyze::lattice::snap::{self, Snap};
+use crate::analyze::lattice::snap::{self, MOST_SCALING, Snap};
 use crate::analyze::lattice::{self, reduced_size};
 use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
@@ -65,7 +65,13 @@ impl Lattice {
     /// little the photo must be scaled for it; `None` if there is none within half and twice that
     /// size. See [`Snap`].
     pub fn snap(&self, width: usize, height: usize) -> Option<Snap> {
-        snap::snap(self.basis(), width, height)
+        snap::snap(self.basis(), (width, height), 0.0)
+    }
+
+    /// The same for what can be laid a little askew: pieces that are fitted to each other, which share
+    /// out a lean of the lattice as they do the scaling.
+    pub(super) fn snap_pieces(&self, width: usize, height: usize) -> Option<Snap> {
+        snap::snap(self.basis(), (width, height), MOST_SCALING)
     }
 
     /// The lattice drawn over a picture as large as the photo: bright lines with dark rims, through

@@ -342,7 +342,7 @@ fn follow(
          {confidence:.2})"
     );
     let fixed = params.size != Size::Auto || inputs.redo.is_some();
-    let snap = lattice.snap(width, height);
+    let snap = lattice.snap_pieces(width, height);
     let Some(snap) = snap.filter(|s| !fixed || (s.width, s.height) == (width, height)) else {
         let whole = snap.map_or(String::new(), |s| format!("; {}x{} does", s.width, s.height));
         notes.push(format!(

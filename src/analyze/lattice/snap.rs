@@ -36,11 +36,12 @@ pub struct Snap {
 
 /// The rectangle nearest to `width` x `height` that the lattice repeats in: the wished side itself
 /// wherever scaling by at most [`MOST_SCALING`] makes it a period, else the nearest period; `None` if
-/// there is none from half to twice the wished side.
-pub fn snap(basis: Basis, width: usize, height: usize) -> Option<Snap> {
-    let (w, scale_x, a, misfit_x) = along(basis, width)?;
+/// there is none from half to twice the wished side. `lean` is the misfit allowed beside the usual, as a
+/// share of the displacement: 0 for what is cut out as it is.
+pub fn snap(basis: Basis, (width, height): (usize, usize), lean: f64) -> Option<Snap> {
+    let (w, scale_x, a, misfit_x) = along(basis, width, lean)?;
     // The vertical axis is the horizontal one of the transposed lattice.
-    let (h, scale_y, b, misfit_y) = along(basis.map(|[x, y]| [y, x]), height)?;
+    let (h, scale_y, b, misfit_y) = along(basis.map(|[x, y]| [y, x]), height, lean)?;
     let periods = [a, b];
     Some(Snap { width: w, height: h, scale_x, scale_y, periods, misfit: [misfit_x, misfit_y] })
 }
@@ -49,12 +50,13 @@ pub fn snap(basis: Basis, width: usize, height: usize) -> Option<Snap> {
 type Side = (usize, f64, [i64; 2], f64);
 
 /// The best displacement along the first axis.
-fn along(basis: Basis, wish: usize) -> Option<Side> {
+fn along(basis: Basis, wish: usize, lean: f64) -> Option<Side> {
     let far = 2.0 * wish as f64;
-    let allowed = MISFIT_PIXELS.max(MISFIT * dot(basis[0], basis[0]).sqrt());
+    let upright = MISFIT_PIXELS.max(MISFIT * dot(basis[0], basis[0]).sqrt());
+    let most_off = upright.max(lean * far);
     // The vector that leads away from the axis faster brings back what the other has left it by.
     let back = usize::from(basis[1][1].abs() >= basis[0][1].abs());
-    let most = [[far, allowed], [far, -allowed]]
+    let most = [[far, most_off], [far, -most_off]]
         .map(|corner| coefficients(basis, corner)[1 - back].abs())
         .into_iter()
         .fold(0.0, f64::max) as i64;
@@ -64,6 +66,7 @@ fn along(basis: Basis, wish: usize) -> Option<Side> {
         for j in [rest.floor() as i64, rest.floor() as i64 + 1] {
             let periods = if back == 1 { [i, j] } else { [j, i] };
             let [length, off]: Vector = combined(basis, periods[0] as f64, periods[1] as f64);
+            let allowed = upright.max(lean * length);
             if length < 1.0 || off.abs() > allowed {
                 continue;
             }
@@ -128,7 +131,7 @@ mod tests {
             for (width, height) in [(256, 256), (500, 300), (97, 411)] {
                 let transposed = basis.map(|[x, y]: [f64; 2]| [y, x]);
                 let want = naive(basis, width).zip(naive(transposed, height));
-                let got = snap(basis, width, height);
+                let got = snap(basis, (width, height), 0.0);
                 assert_eq!(got.is_some(), want.is_some(), "{basis:?} at {width}x{height}");
                 if let Some((got, ((w, sx), (h, sy)))) = got.zip(want) {
                     found += 1;
@@ -144,7 +147,7 @@ mod tests {
     fn a_snapped_size_is_a_scaled_lattice_displacement() {
         let basis = [[85.3, -127.8], [85.1, 127.9]];
         let Snap { width, height, scale_x, scale_y, periods, misfit } =
-            snap(basis, 512, 512).expect("near");
+            snap(basis, (512, 512), 0.0).expect("near");
         // Running bond: rows shifted by half, so the rectangle has twice the cell's area.
         assert_eq!((width, height, periods), (512, 512, [[3, 3], [-2, 2]]));
         let [x, off_x] = combined(basis, 3.0, 3.0);
@@ -155,7 +158,12 @@ mod tests {
 
     #[test]
     fn without_a_rectangle_near_there_is_none() {
-        assert_eq!(snap([[400.0, 0.0], [0.0, 400.0]], 128, 128), None, "periods too long");
-        assert_eq!(snap([[100.0, 8.0], [-8.0, 100.0]], 300, 300), None, "askew");
+        assert_eq!(snap([[400.0, 0.0], [0.0, 400.0]], (128, 128), 0.0), None, "periods too long");
+        let askew = [[100.0, 2.5], [-2.5, 100.0]];
+        assert_eq!(snap(askew, (300, 300), 0.0), None, "askew");
+        let leaning = snap(askew, (300, 300), 0.03).expect("it may lean");
+        assert_eq!((leaning.width, leaning.periods), (300, [[3, 0], [0, 3]]));
+        assert!((leaning.misfit[0] - 7.5).abs() < 1e-9, "{leaning:?}");
+        assert_eq!(snap([[100.0, 8.0], [-8.0, 100.0]], (300, 300), 0.03), None, "too much");
     }
 }
