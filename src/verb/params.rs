@@ -10,8 +10,9 @@ use crate::signal::measure::{ORDERS, Statistic};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Size {
     /// The largest power of two that is at most a tenth larger than the photo's shorter side, at
-    /// most 2048; not square if the photo is at least twice as long as it is wide. With
-    /// [`Method::MakeSeamless`], the photo's own size.
+    /// most 2048; not square if the photo is at least twice as long as it is wide. If the photo
+    /// repeats (see [`Follow`]), whole periods near that. With [`Method::MakeSeamless`] or a band, the
+    /// photo's own size.
     Auto,
     /// This many pixels.
     Pixels {
@@ -137,7 +138,7 @@ impl Symmetries {
 params! {
     /// Parameters of [`tile`].
     pub struct TileParams for "tile" {
-        /// Size of the tile: WIDTHxHEIGHT, or auto for the largest power of two that about fits into the photo.
+        /// Size of the tile: WIDTHxHEIGHT, or auto for the largest power of two that about fits into the photo, or whole periods near it if the photo repeats.
         size: Size = Size::Auto, unit "px";
         /// In which directions the tile repeats.
         axis: Axis = Axis::Both;

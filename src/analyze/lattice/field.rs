@@ -68,12 +68,14 @@ impl Field {
         let mut excess = vec![0.0f32; rows * cols];
         // The upper half; the lower is its mirror image.
         excess[..(reach[0] + 1) * cols].par_chunks_mut(cols).enumerate().for_each(|(i, row)| {
-            let y = i as f64 - reach[0] as f64;
-            for (j, value) in row.iter_mut().enumerate() {
-                let x = j as f64 - reach[1] as f64;
-                let ridge = |&direction: &[f64; 2]| ridge(&smooth, [y, x], direction, half, lobe);
-                let highest = directions.iter().map(ridge).fold(0.0, f64::max);
-                *value = (f64::from(smooth.at(y as isize, x as isize)) - highest) as f32;
+            let y = i as isize - reach[0] as isize;
+            let mut highest = vec![0.0f64; cols];
+            for &direction in &directions {
+                let means = ridges(&smooth, (y, reach[1] as isize), direction, half, lobe);
+                highest.iter_mut().zip(means).for_each(|(h, mean)| *h = h.max(mean));
+            }
+            for ((x, value), highest) in (-(reach[1] as isize)..).zip(row).zip(highest) {
+                *value = (f64::from(smooth.at(y, x)) - highest) as f32;
             }
         });
         for i in (reach[0] + 1) * cols..rows * cols {
@@ -158,6 +160,12 @@ impl Plane {
         Self { reach, values }
     }
 
+    /// All displacements of a row.
+    fn row(&self, y: isize) -> &[f32] {
+        let cols = (2 * self.reach[1] + 1) as usize;
+        &self.values[(y + self.reach[0]) as usize * cols..][..cols]
+    }
+
     fn at(&self, y: isize, x: isize) -> f32 {
         self.values[((y + self.reach[0]) * (2 * self.reach[1] + 1) + x + self.reach[1]) as usize]
     }
@@ -217,18 +225,82 @@ fn ridge_directions(plane: &Plane, shorter: f64, lobe: f64) -> Vec<[f64; 2]> {
     taken.into_iter().map(unit).collect()
 }
 
-/// The mean along the line through `middle`.
-fn ridge(plane: &Plane, middle: [f64; 2], direction: [f64; 2], half: f64, lobe: f64) -> f64 {
-    let (mut n, mut sum) = (0, 0.0);
+/// The means along the lines in a direction through all displacements of a row, `y` and from -`reach`
+/// to `reach`; 0 where nothing is known. What lies within `lobe` of no displacement does not count.
+fn ridges(
+    plane: &Plane,
+    (y, reach): (isize, isize),
+    [dy, dx]: [f64; 2],
+    half: f64,
+    lobe: f64,
+) -> Vec<f64> {
+    let cols = (2 * reach + 1) as usize;
+    let (mut sum, mut n) = (vec![0.0; cols], vec![0.0; cols]);
     for i in -RIDGE_SAMPLES..=RIDGE_SAMPLES {
+        // A sample lies alike between displacements for the whole row.
         let t = half * f64::from(i) / f64::from(RIDGE_SAMPLES);
-        let (y, x) = (middle[0] + t * direction[0], middle[1] + t * direction[1]);
-        if y * y + x * x > lobe * lobe
-            && let Some(v) = plane.sample(y, x)
-        {
-            n += 1;
-            sum += v;
+        let (at_y, by_x) = (y as f64 + t * dy, t * dx);
+        let (y0, x0) = (floor(at_y), floor(by_x));
+        let (fy, fx) = (at_y - y0 as f64, by_x - x0 as f64);
+        if y0 < -plane.reach[0] || y0 >= plane.reach[0] {
+            continue;
+        }
+        // The columns whose sample has known neighbours.
+        let first = (-reach).max(-plane.reach[1] - x0);
+        let last = reach.min(plane.reach[1] - 1 - x0);
+        if first > last {
+            continue;
+        }
+        let (from, count) = ((first + reach) as usize, (last - first + 1) as usize);
+        let line = |y: isize| &plane.row(y)[(first + x0 + plane.reach[1]) as usize..][..=count];
+        let (upper, lower) = (line(y0), line(y0 + 1));
+        let (sum, n) = (&mut sum[from..][..count], &mut n[from..][..count]);
+        for (k, (sum, n)) in sum.iter_mut().zip(n).enumerate() {
+            let x = (first + k as isize) as f64 + by_x;
+            let counts = f64::from(u8::from(at_y * at_y + x * x > lobe * lobe));
+            let between = |line: &[f32]| {
+                let (a, b) = (f64::from(line[k]), f64::from(line[k + 1]));
+                a + (b - a) * fx
+            };
+            let (top, bottom) = (between(upper), between(lower));
+            *sum += counts * (top + (bottom - top) * fy);
+            *n += counts;
         }
     }
-    if n > 0 { sum / f64::from(n) } else { 0.0 }
+    sum.iter().zip(n).map(|(sum, n)| if n > 0.0 { sum / n } else { 0.0 }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::rng::Rng;
+
+    /// The mean along one line, sample by sample.
+    fn ridge(plane: &Plane, [y, x]: [f64; 2], [dy, dx]: [f64; 2], half: f64, lobe: f64) -> f64 {
+        let on = |i: i32| {
+            let t = half * f64::from(i) / f64::from(RIDGE_SAMPLES);
+            let (y, x) = (y + t * dy, x + t * dx);
+            if y.hypot(x) > lobe { plane.sample(y, x) } else { None }
+        };
+        let known: Vec<f64> = (-RIDGE_SAMPLES..=RIDGE_SAMPLES).filter_map(on).collect();
+        if known.is_empty() { 0.0 } else { known.iter().sum::<f64>() / known.len() as f64 }
+    }
+
+    #[test]
+    fn ridges_of_a_row_are_those_of_its_displacements() {
+        let mut rng = Rng::new(8, 0, 0, 0);
+        let reach = [30isize, 41];
+        let values = (0..61 * 83).map(|_| rng.below(1000) as f32 / 500.0 - 1.0).collect();
+        let plane = Plane { reach, values };
+        for direction in [[0.0, 1.0], [1.0, 0.0], [0.6, 0.8], [-0.28, 0.96]] {
+            for y in [-30isize, -17, -3, 0, 12, 30] {
+                let row = ridges(&plane, (y, 35), direction, 19.3, 4.1);
+                assert_eq!(row.len(), 71);
+                for (x, got) in (-35..).zip(row) {
+                    let want = ridge(&plane, [y as f64, f64::from(x)], direction, 19.3, 4.1);
+                    assert!((got - want).abs() < 1e-9, "{direction:?}, {y}, {x}: {got}, {want}");
+                }
+            }
+        }
+    }
 }
