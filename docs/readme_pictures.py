@@ -72,6 +72,14 @@ def main() -> None:
         cells.append((f"{label}; cost {cost:.2f}; 3 x 3", small(tile.tiled(), 0.333)))
     save("stain.jpg", [cells])
 
+    palette = texforge.palette(photo, size=SIDE)
+    places = zip(palette.stationarities, palette.tiles, strict=True)
+    cells = [
+        (f"stationarity {place:.2f}; 2 x 2", small(tile.tiled(2, 2), 0.25))
+        for place, tile in places
+    ]
+    save("palette.jpg", [cells])
+
 
 if __name__ == "__main__":
     main()

@@ -136,6 +136,11 @@ impl Band<'_> {
             for ((item, own), out) in items.zip(random.chunks_exact_mut(radii.len().max(1))) {
                 self.random_candidates(*own, &radii, item, out);
             }
+            if let Some(phase) = &self.search.phase {
+                for (i, pos) in random.iter_mut().enumerate() {
+                    *pos = phase.near(self.source, (y, i / radii.len()), *pos);
+                }
+            }
             let end = if backward { 0 } else { width - 1 };
             let mut beside = self.wrap.x.then(|| row[end]);
             for at in 0..width {
@@ -236,10 +241,6 @@ impl Band<'_> {
             let y = y_low + rng.below((y_high - y_low + 1) as u32) as i32;
             let x = x_low + rng.below((x_high - x_low + 1) as u32) as i32;
             *out = Pos::new(y as usize, x as usize);
-            if let Some(phase) = &self.search.phase {
-                let pixel = (item / self.field.width, item % self.field.width);
-                *out = phase.near(self.source, pixel, *out);
-            }
         }
     }
 

@@ -45,7 +45,7 @@ impl Phase {
 
     /// The place in phase with output pixel (`y`, `x`) that is nearest to `pos` (nearly: by rounding
     /// coefficients); `pos` itself if it is in phase, or if the source has no such place around it.
-    #[inline]
+    #[inline(never)]
     pub fn near(&self, source: &Source, (y, x): (usize, usize), pos: Pos) -> Pos {
         let center = [pos.x() as f64 + self.half, pos.y() as f64 + self.half];
         let there = combined(self.of_source, center);
