@@ -51,7 +51,7 @@ class Palette:
     picture: npt.NDArray[Any]
 
     def save(self, path: PathType, *, overwrite: bool = False) -> list[Path]:
-        """Write the tiles and the picture of all, named as ``texforge palette`` names them.
+        """Write the tiles and the picture of all.
 
         Parameters
         ----------
