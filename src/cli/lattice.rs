@@ -10,7 +10,7 @@ use crate::base::error::Result;
 use crate::cli::output::to_stdout;
 use crate::cli::show::table;
 use crate::cli::small::{SCHEMA_VERSION, print_json};
-use crate::cli::work::{Session, supervise, watch_signals};
+use crate::cli::work::{Session, supervise};
 use crate::cli::{args, files};
 use crate::image::io::Format;
 use crate::image::material::MapKind;
@@ -40,9 +40,7 @@ pub(super) fn run(matches: &ArgMatches) -> Result<()> {
         autocorrelation: path("autocorrelation"),
         force: matches.get_flag("force"),
     };
-    let ctx = Ctx::new(0, matches.get_one::<usize>("threads").copied().unwrap_or(0))?;
-    let session = Session::new(ctx.job(), matches.get_flag("quiet"));
-    watch_signals();
+    let (ctx, session) = Session::begin(matches)?;
     let json = matches.get_flag("json");
     let lattice = supervise(&session, move |session| work(session, &ctx, &request))?;
     if json { print_json(&report(&lattice)) } else { to_stdout(text(&lattice).as_bytes()) }

@@ -13,7 +13,7 @@ use crate::cli::show::duration;
 use crate::cli::small::{SCHEMA_VERSION, print_json};
 use crate::cli::sources::Sources;
 use crate::cli::summary::{self, Written};
-use crate::cli::work::{Session, supervise, watch_signals};
+use crate::cli::work::{Session, supervise};
 use crate::cli::{args, files};
 use crate::image::material::MapKind;
 use crate::verb::palette::{MAX_STEPS, Palette, palette};
@@ -118,11 +118,7 @@ pub(super) fn run(matches: &ArgMatches) -> Result<()> {
         sheet: output.with_extension("palette.png"),
         force: matches.get_flag("force"),
     };
-    let seed = matches.get_one("seed").copied().unwrap_or_default();
-    let threads = matches.get_one("threads").copied().unwrap_or_default();
-    watch_signals();
-    let ctx = Ctx::new(seed, threads)?;
-    let session = Session::new(ctx.job(), matches.get_flag("quiet"));
+    let (ctx, session) = Session::begin(matches)?;
     let (summary, lines) = supervise(&session, move |session| work(session, &ctx, &request))?;
     lines.iter().for_each(|line| session.console.say(line));
     if matches.get_flag("json") { print_json(&summary) } else { Ok(()) }

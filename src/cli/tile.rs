@@ -12,7 +12,7 @@ use crate::cli::output::{Target, to_stdout};
 use crate::cli::small::print_json;
 use crate::cli::sources::Sources;
 use crate::cli::summary::{self, Summary, Written};
-use crate::cli::work::{Session, supervise, watch_signals};
+use crate::cli::work::{Session, supervise};
 use crate::cli::{args, files};
 use crate::image::material::{MapKind, Sibling};
 use crate::image::picture::Picture;
@@ -61,12 +61,7 @@ impl Place {
 /// Whatever keeps it from being done; then no file was written.
 pub(super) fn run(matches: &ArgMatches) -> Result<()> {
     let request = Request::typed(matches)?;
-    let seed = matches.get_one("seed").copied().unwrap_or_default();
-    let threads = matches.get_one("threads").copied().unwrap_or_default();
-    // Before the first thread: whoever sees that one may send a signal.
-    watch_signals();
-    let ctx = Ctx::new(seed, threads)?;
-    let session = Session::new(ctx.job(), matches.get_flag("quiet"));
+    let (ctx, session) = Session::begin(matches)?;
     let (summary, lines) = supervise(&session, move |session| work(session, &ctx, &request))?;
     lines.iter().for_each(|line| session.console.say(line));
     if matches.get_flag("json") { print_json(&summary) } else { Ok(()) }

@@ -6,7 +6,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
-use crate::base::ctx::Job;
+use clap::ArgMatches;
+
+use crate::base::ctx::{Ctx, Job};
 use crate::base::error::{Error, Result};
 use crate::cli::output::Staging;
 use crate::cli::show::Console;
@@ -51,6 +53,20 @@ impl Session {
     /// A session around the job of a run.
     pub(super) fn new(job: Arc<Job>, quiet: bool) -> Arc<Self> {
         Arc::new(Self { job, console: Console::new(quiet), staging: Staging::default() })
+    }
+
+    /// Begins a run as typed: `--seed` (0 for a command without), `--threads` and `--quiet`.
+    ///
+    /// # Errors
+    /// Those of [`Ctx::new`].
+    pub(super) fn begin(matches: &ArgMatches) -> Result<(Ctx, Arc<Self>)> {
+        let seed = matches.try_get_one("seed").ok().flatten().copied().unwrap_or_default();
+        let threads = matches.get_one("threads").copied().unwrap_or_default();
+        // Before the first thread: whoever sees that one may send a signal.
+        watch_signals();
+        let ctx = Ctx::new(seed, threads)?;
+        let session = Self::new(ctx.job(), matches.get_flag("quiet"));
+        Ok((ctx, session))
     }
 
     /// Fails once the user has asked to stop; for the stretches of work outside the core.

@@ -23,7 +23,7 @@ pub fn lattice(picture: &Picture, [v1, v2]: [[f64; 2]; 2]) -> Result<Picture> {
     // Coefficients of a displacement; a line of the lattice is where one of them is whole. The
     // distance to it is the coefficient's, divided by the length of its gradient.
     let rows = [[v2[1] / det, -v2[0] / det], [-v1[1] / det, v1[0] / det]];
-    let lengths = rows.map(|g| g[0].hypot(g[1]));
+    let lengths = rows.map(|g| libm::hypot(g[0], g[1]));
     let half = (HALF * width.max(height) as f64).max(0.5);
     let unit = |i: usize| {
         let v = picture.samples().unit(i);

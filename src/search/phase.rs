@@ -2,9 +2,7 @@
 
 use crate::search::field::Pos;
 use crate::search::source::Source;
-
-/// Two vectors, each to the right and downwards.
-pub type Vectors = [[f64; 2]; 2];
+use crate::signal::basis::{Basis, combined, dot};
 
 /// How far from its place in the cell a match may lie, as a share of the shorter vector: bricks are
 /// not laid to the pixel.
@@ -18,10 +16,10 @@ const TOLERANCE_PIXELS: f64 = 1.0;
 #[derive(Debug, Clone, Copy)]
 pub struct Phase {
     /// The lattice's vectors in the source, in its pixels.
-    source: Vectors,
-    /// Coefficients of a place in the source, and of one in the output, row by row.
-    of_source: Vectors,
-    of_output: Vectors,
+    source: Basis,
+    /// What gives the coefficients of a place in the source, and of one in the output.
+    of_source: Inverse,
+    of_output: Inverse,
     /// From a patch's corner to its middle.
     half: f64,
     /// Square of the distance that counts as in phase.
@@ -31,8 +29,8 @@ pub struct Phase {
 impl Phase {
     /// The lattice of the vectors `source` in the source's pixels and `output` in the output's, for
     /// patches of side `patch`. `None` if two vectors are parallel.
-    pub fn new(source: Vectors, output: Vectors, patch: usize) -> Option<Self> {
-        let shorter = source.map(|[x, y]| x.hypot(y)).into_iter().fold(f64::MAX, f64::min);
+    pub fn new(source: Basis, output: Basis, patch: usize) -> Option<Self> {
+        let shorter = source.map(|v| dot(v, v).sqrt()).into_iter().fold(f64::MAX, f64::min);
         let tolerance = (TOLERANCE * shorter).max(TOLERANCE_PIXELS);
         Some(Self {
             source,
@@ -48,25 +46,22 @@ impl Phase {
     #[inline(never)]
     pub fn near(&self, source: &Source, (y, x): (usize, usize), pos: Pos) -> Pos {
         let center = [pos.x() as f64 + self.half, pos.y() as f64 + self.half];
-        let there = combined(self.of_source, center);
-        let here = combined(self.of_output, [x as f64, y as f64]);
+        let there = coefficients(self.of_source, center);
+        let here = coefficients(self.of_output, [x as f64, y as f64]);
         // By how much of a cell it is off.
         let off: [f64; 2] = std::array::from_fn(|k| {
             let apart = there[k] - here[k];
             apart - apart.round()
         });
-        let moved = |off: [f64; 2]| {
-            let [v1, v2] = self.source;
-            [v1[0] * off[0] + v2[0] * off[1], v1[1] * off[0] + v2[1] * off[1]]
-        };
-        let [dx, dy] = moved(off);
+        let moved = |a: f64, b: f64| combined(self.source, off[0] + a, off[1] + b);
+        let [dx, dy] = moved(0.0, 0.0);
         if dx * dx + dy * dy <= self.tolerance {
             return pos;
         }
         // The nearest first; at the source's border a cell farther in.
         for [a, b] in [[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [-1, -1], [1, -1], [-1, 1]]
         {
-            let [dx, dy] = moved([off[0] + f64::from(a), off[1] + f64::from(b)]);
+            let [dx, dy] = moved(f64::from(a), f64::from(b));
             let (px, py) = ((pos.x() as f64 - dx).round(), (pos.y() as f64 - dy).round());
             let inside = |p: f64, n: usize| p >= 0.0 && p < n as f64;
             if inside(px, source.cols()) && inside(py, source.rows()) {
@@ -77,14 +72,16 @@ impl Phase {
     }
 }
 
-/// The matrix that gives the coefficients of a place in two vectors, row by row.
-fn inverse([[ax, ay], [bx, by]]: Vectors) -> Option<Vectors> {
+/// A matrix row by row. Like [`signal::basis::coefficients`](crate::signal::basis::coefficients), but
+/// divided once for all places.
+type Inverse = [[f64; 2]; 2];
+
+fn inverse([[ax, ay], [bx, by]]: Basis) -> Option<Inverse> {
     let area = ax * by - ay * bx;
     (area.abs() > 1e-9).then(|| [[by / area, -bx / area], [-ay / area, ax / area]])
 }
 
-/// The coefficients of a place.
-fn combined([a, b]: Vectors, [x, y]: [f64; 2]) -> [f64; 2] {
+fn coefficients([a, b]: Inverse, [x, y]: [f64; 2]) -> [f64; 2] {
     [a[0] * x + a[1] * y, b[0] * x + b[1] * y]
 }
 
@@ -99,7 +96,7 @@ mod tests {
     }
 
     /// How far `pos` is from the nearest of all places in phase, by trying them all.
-    fn off(source: Vectors, output: Vectors, (y, x): (usize, usize), pos: Pos) -> f64 {
+    fn off(source: Basis, output: Basis, (y, x): (usize, usize), pos: Pos) -> f64 {
         // The output's pixel in cells, and from there all places of the source.
         let area = output[0][0] * output[1][1] - output[0][1] * output[1][0];
         let (fx, fy) = (x as f64, y as f64);

@@ -1,6 +1,7 @@
 //! Room 2: mathematics on planes. No textures, no policy.
 
 pub mod autocorrelation;
+pub mod basis;
 pub mod histogram;
 pub mod localhist;
 pub mod lowpass;

@@ -2,7 +2,6 @@
 
 use rayon::prelude::*;
 
-use crate::analyze::lattice::basis::{Basis, area};
 use crate::analyze::lattice::snap::{self, MOST_SCALING, Snap};
 use crate::analyze::lattice::{self, reduced_size};
 use crate::base::ctx::Ctx;
@@ -14,6 +13,7 @@ use crate::image::mask::Mask;
 use crate::image::overlay;
 use crate::image::picture::{Encoding, Picture, Samples};
 use crate::signal::autocorrelation::Autocorrelation;
+use crate::signal::basis::{Basis, area};
 
 /// Shortest side of a photo that can be looked at: two periods of a few pixels.
 const SMALLEST: usize = 16;
@@ -104,6 +104,7 @@ impl Lattice {
 /// pixels are alike, [`Error::NotFinite`], [`Error::Memory`], [`Error::Cancelled`].
 pub fn detect_lattice(ctx: &Ctx, photo: &Picture, params: &LatticeParams) -> Result<Lattice> {
     params.validate()?;
+    ctx.begin(lattice::STEPS);
     detect(ctx, photo, params, false)
 }
 

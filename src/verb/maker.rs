@@ -72,7 +72,7 @@ impl<'a> Maker<'a> {
                 periods = Some(found);
             }
         }
-        let wrap = Wrap { y: params.axis != Axis::X, x: params.axis != Axis::Y };
+        let wrap = wrap(params);
         let masks = inputs.usable(params)?;
         if masks[0].is_some() && params.method == Method::MakeSeamless {
             notes.push(
@@ -193,6 +193,11 @@ impl<'a> Maker<'a> {
         };
         Ok(Tile { picture, source_map, report, trace })
     }
+}
+
+/// The axes on which the tile shall repeat.
+pub(super) fn wrap(params: &TileParams) -> Wrap {
+    Wrap { y: params.axis != Axis::X, x: params.axis != Axis::Y }
 }
 
 /// Whether anything is made equal everywhere.
@@ -438,11 +443,8 @@ fn costs(
     sigma_map: Option<&SigmaMap>,
     wrap: Wrap,
 ) -> Costs {
-    let model = ColorModel::new(photos[0]);
-    let mut pixels = model.averaging_pixels(picture);
-    model.space().convert_row(&mut pixels);
-    let (height, width) = (picture.height(), picture.width());
-    let domain = Domain { height, width, wrap_y: wrap.y, wrap_x: wrap.x };
+    let (pixels, domain) = colors(photos[0], picture, wrap);
+    let (height, width) = (domain.height, domain.width);
     let sigma = f64::from(params.sigma) * height.min(width) as f64;
     let stationarity = stationarity::histogram_cost(&pixels, domain, sigma);
     let by_measure = |evenness: Evenness| match evenness.statistic {
@@ -454,4 +456,13 @@ fn costs(
         stationarity,
         stationarity_by_measure: params.evenness(sigma_map).map(by_measure),
     }
+}
+
+/// A tile's pixels in the space in which its photo is matched (L*a*b* for colours), and its domain.
+pub(super) fn colors(photo: &Picture, tile: &Picture, wrap: Wrap) -> (Vec<[f32; 3]>, Domain) {
+    let model = ColorModel::new(photo);
+    let mut pixels = model.averaging_pixels(tile);
+    model.space().convert_row(&mut pixels);
+    let (height, width) = (tile.height(), tile.width());
+    (pixels, Domain { height, width, wrap_y: wrap.y, wrap_x: wrap.x })
 }

@@ -3,13 +3,11 @@
 use crate::analyze::appearance::Appearance;
 use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
-use crate::image::color::ColorModel;
 use crate::image::picture::Picture;
 use crate::image::sheet::{self, Cell};
-use crate::signal::window::Domain;
 use crate::verb::inputs::Inputs;
-use crate::verb::maker::Maker;
-use crate::verb::params::{Axis, TileParams};
+use crate::verb::maker::{Maker, colors, wrap};
+use crate::verb::params::TileParams;
 use crate::verb::tile::Tile;
 
 /// Most steps of a palette.
@@ -89,18 +87,12 @@ pub fn palette(
     let tiles = (0..steps).map(|i| maker.make(ctx, ctx.seed, Some(place(i))));
     let tiles = tiles.collect::<Result<Vec<Tile>>>()?;
     let differences = ctx.install(|| {
-        let looks: Vec<Appearance> = tiles.iter().map(|tile| look(inputs, &params, tile)).collect();
+        let look = |tile: &Tile| {
+            let (pixels, domain) = colors(inputs.photo, &tile.picture, wrap(&params));
+            Appearance::of(&pixels, domain)
+        };
+        let looks: Vec<Appearance> = tiles.iter().map(look).collect();
         Ok(looks.windows(2).map(|pair| pair[0].distance(&pair[1])).collect())
     })?;
     Ok(Palette { tiles, differences, curve })
-}
-
-/// What a tile looks like, in L*a*b*.
-fn look(inputs: &Inputs<'_>, params: &TileParams, tile: &Tile) -> Appearance {
-    let model = ColorModel::new(inputs.photo);
-    let mut pixels = model.averaging_pixels(&tile.picture);
-    model.space().convert_row(&mut pixels);
-    let (height, width) = (tile.picture.height(), tile.picture.width());
-    let (wrap_y, wrap_x) = (params.axis != Axis::X, params.axis != Axis::Y);
-    Appearance::of(&pixels, Domain { height, width, wrap_y, wrap_x })
 }

@@ -1,6 +1,5 @@
 //! The lattice of a near-regular picture.
 
-pub mod basis;
 mod field;
 mod pairs;
 mod refine;
@@ -12,9 +11,9 @@ use crate::base::ctx::Ctx;
 use crate::base::error::Result;
 use crate::image::mask::Mask;
 use crate::signal::autocorrelation::Autocorrelation;
+use crate::signal::basis::{Basis, reduced};
 use crate::signal::lowpass::LowPass;
 use crate::signal::resample::{resized, resized_mask};
-use basis::{Basis, reduced};
 use field::Field;
 
 /// Square roots of the areas, in pixels, to which the picture is reduced. Large patterns are found
@@ -58,7 +57,7 @@ struct Candidate {
 /// What was found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Found {
-    /// The vectors, reduced (see [`basis::reduced`]).
+    /// The vectors, reduced (see [`reduced`]).
     pub basis: Basis,
     /// How sure it is that the picture has a lattice and this is it, in 0..=1.
     pub confidence: f64,
@@ -68,8 +67,8 @@ pub struct Found {
     pub correlation: f64,
 }
 
-/// Steps of progress that [`find`] announces.
-const STEPS: u64 = SIDES.len() as u64;
+/// Steps of progress that [`find`] counts.
+pub const STEPS: u64 = SIDES.len() as u64;
 
 /// The best lattice of a picture (`pixels`, `height` x `width`, of which `usable` count); `None` if
 /// there is no candidate at all. Periods shorter than `min_period` pixels do not count. `hurried`, it
@@ -88,7 +87,6 @@ pub fn find(
     min_period: f64,
     hurried: bool,
 ) -> Result<Option<Found>> {
-    ctx.begin(STEPS);
     let mut chosen: Option<Candidate> = None;
     let mut finest = None;
     let mut last = (0, 0);

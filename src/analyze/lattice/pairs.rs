@@ -1,8 +1,8 @@
 //! Pairs of displacements, and how well a picture repeats by them.
 
 use super::Candidate;
-use super::basis::{Basis, Vector, area, combined, directed, dot};
 use super::field::Field;
+use crate::signal::basis::{Basis, Vector, area, combined, directed, dot};
 
 /// Preference for small cells among equally good ones. The paper's.
 const ALPHA: f64 = 1.12;

@@ -1,9 +1,9 @@
 //! A lattice fitted to all peaks that belong to it.
 
 use super::Candidate;
-use super::basis::{Basis, area, combined, dot, reduced};
 use super::field::Field;
 use super::pairs::{goodness, multiples, summit};
+use crate::signal::basis::{Basis, area, combined, dot, reduced};
 
 /// Multiples up to this coefficient take part in the first fit, the second, and so on: near peaks
 /// must be hit before the far ones can be.
@@ -92,7 +92,7 @@ pub(super) fn sharpened(field: &Field, basis: Basis, scale: [f64; 2]) -> Option<
     let near = |v: [f64; 2], want: [f64; 2]| {
         let off = combined(there, want[0], want[1]);
         let length = dot(there[0], there[0]).sqrt();
-        (v[0] - off[0]).hypot(v[1] - off[1]) < 0.05 * length
+        libm::hypot(v[0] - off[0], v[1] - off[1]) < 0.05 * length
     };
     (near(fit[0], [1.0, 0.0]) && near(fit[1], [0.0, 1.0]))
         .then(|| fit.map(|v| [v[0] / scale[0], v[1] / scale[1]]))

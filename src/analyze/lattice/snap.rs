@@ -1,6 +1,6 @@
 //! Rectangles that a lattice repeats in.
 
-use super::basis::{Basis, Vector, coefficients, combined, dot};
+use crate::signal::basis::{Basis, Vector, coefficients, combined, dot};
 
 /// By how much a photo may be stretched or squeezed. Much more shows as bricks of another shape.
 pub const MOST_SCALING: f64 = 0.03;

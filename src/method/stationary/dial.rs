@@ -10,7 +10,7 @@ use crate::signal::window::Domain;
 
 /// Sigma at 0 and at 1. A Gaussian of half the tile sees all of it from everywhere, so a wider one
 /// changes nothing; narrower than the other, it leaves one material of the photo.
-pub const SIGMAS: (f32, f32) = (0.5, 0.02);
+const SIGMAS: (f32, f32) = (0.5, 0.02);
 
 /// Sigmas that are looked at first, in even factors.
 const FIRST: usize = 9;

@@ -21,18 +21,19 @@ use crate::search::atlas::Atlas;
 use crate::search::field::{Field, Pos};
 use crate::search::patch::MatchImage;
 use crate::search::patchmatch::{self, Search, Wrap};
-use crate::search::phase::{Phase, Vectors};
+use crate::search::phase::Phase;
 use crate::search::place_cost::PlaceCost;
 use crate::search::seams;
 use crate::search::source::Source;
 use crate::search::vote::{Votes, vote};
+use crate::signal::basis::Basis;
 use crate::signal::histogram::{Distribution, SOFT_BITS};
 use crate::signal::measure::Statistic;
 use crate::signal::resample::resized;
 use crate::signal::window::{Domain, Window};
 
 use balance::Balance;
-pub use dial::{Dial, SIGMAS};
+pub use dial::Dial;
 pub use kept::Kept;
 use kept::KeptLevel;
 use level::Level;
@@ -86,7 +87,7 @@ pub struct Plan {
 #[derive(Debug, Clone, Copy)]
 pub struct Periods {
     /// Vectors in pixels of the photo, each to the right and downwards.
-    pub vectors: Vectors,
+    pub vectors: Basis,
     /// Coefficients of the displacements by the output's width and by its height.
     pub of_output: [[i64; 2]; 2],
 }

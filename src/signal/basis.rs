@@ -6,7 +6,8 @@ pub type Vector = [f64; 2];
 /// Two displacements that span a lattice.
 pub type Basis = [Vector; 2];
 
-pub(super) fn dot(a: Vector, b: Vector) -> f64 {
+/// The scalar product.
+pub fn dot(a: Vector, b: Vector) -> f64 {
     a[0] * b[0] + a[1] * b[1]
 }
 
