@@ -1,6 +1,7 @@
 //! Room 3: who looks like whom.
 
 pub mod atlas;
+pub mod cut;
 pub mod field;
 pub mod patch;
 pub mod patchmatch;

@@ -1,5 +1,6 @@
 //! The lattice of a near-regular picture.
 
+pub mod drift;
 mod field;
 mod pairs;
 mod refine;

@@ -11,6 +11,7 @@ use rayon::prelude::*;
 
 use crate::search::atlas::Atlas;
 use crate::search::field::Pos;
+use crate::search::patch::codes::Codes;
 use crate::search::patch::{CODE_MAX, MatchImage};
 use crate::search::place_cost::PlaceCost;
 use crate::search::rarity::rarity;
@@ -40,56 +41,6 @@ const USAGE_SHARE: f64 = 0.024;
 /// Shorter side of the largest level at which rare places are looked for. A patch then spans a
 /// twentieth of the photo; what is smaller than a tenth of a patch here, nobody notices in a tile.
 const RARITY_SIDE: usize = 256;
-
-/// Affine map from L*a*b* to 7-bit codes, the same scale for all channels, so that distances of
-/// codes are Euclidean distances of colours.
-#[derive(Debug, Clone, Copy)]
-struct Codes {
-    low: [f32; 3],
-    /// Codes per unit.
-    scale: f32,
-}
-
-impl Codes {
-    /// Covers 99.8 % of each channel's usable values.
-    fn covering(photos: &[Reduced], space: MatchSpace) -> Self {
-        let usable = |photo: &Reduced, i: usize| photo.usable.as_ref().is_none_or(|u| u[i]);
-        let take = |step: fn(usize) -> usize| {
-            let each = |photo: &Reduced| {
-                let all = (0..photo.pixels.len()).step_by(step(photo.pixels.len()));
-                all.filter(|&i| usable(photo, i)).map(|i| photo.pixels[i]).collect::<Vec<_>>()
-            };
-            photos.iter().flat_map(each).collect::<Vec<_>>()
-        };
-        // Twenty thousand samples of a photo fix the ends well enough.
-        let mut sample = take(|n| (n / 20_000).max(1));
-        if sample.is_empty() {
-            // A few usable pixels between the samples: take them all.
-            sample = take(|_| 1);
-        }
-        space.convert_row(&mut sample);
-        let cut = sample.len() / 1000;
-        let ends = |k: usize| {
-            let mut values: Vec<f32> = sample.iter().map(|px| px[k]).collect();
-            values.sort_unstable_by(f32::total_cmp);
-            match values.len() {
-                0 => (0.0, 0.0),
-                n => (values[cut], values[n - 1 - cut]),
-            }
-        };
-        let ends: [(f32, f32); 3] = std::array::from_fn(ends);
-        let range = ends.iter().map(|(low, high)| high - low).fold(1.0, f32::max);
-        Self { low: ends.map(|(low, _)| low), scale: CODE_MAX as f32 / range }
-    }
-
-    /// The codes of a colour, rounded; colours outside the range are cut.
-    #[inline]
-    fn encode(&self, lab: [f32; 3]) -> [u8; 3] {
-        std::array::from_fn(|k| {
-            ((lab[k] - self.low[k]) * self.scale + 0.5).clamp(0.0, CODE_MAX as f32) as u8
-        })
-    }
-}
 
 /// How many pixels have each code, per channel.
 type Counts = [[u32; CODE_MAX as usize + 1]; 4];
@@ -235,20 +186,11 @@ fn level(
     patch: usize,
     codes: &mut Option<Codes>,
 ) -> Option<(Level, Option<Vec<bool>>)> {
-    let codes = *codes.get_or_insert_with(|| Codes::covering(photos, space));
-    let image = |photo: &Reduced| {
-        let (h, w) = photo.size;
-        let mut colors = MatchImage::new(h, w);
-        colors.fill_rows(|y, row| {
-            let mut lab = photo.pixels[y * w..][..w].to_vec();
-            space.convert_row(&mut lab);
-            for (px, lab) in row.iter_mut().zip(lab) {
-                let [l, a, b] = codes.encode(lab);
-                *px = [l, a, b, 0];
-            }
-        });
-        with_contrast(&colors)
-    };
+    let codes = *codes.get_or_insert_with(|| {
+        let sampled = photos.iter().map(|p| (&p.pixels[..], p.usable.as_deref()));
+        Codes::covering(&sampled.collect::<Vec<_>>(), space)
+    });
+    let image = |photo: &Reduced| with_contrast(&codes.image(&photo.pixels, photo.size, space));
     let sizes: Vec<(usize, usize)> = photos.iter().map(|photo| photo.size).collect();
     let atlas = Atlas::new(&sizes, symmetries)?;
     let flags: Vec<Option<&[bool]>> = photos.iter().map(|photo| photo.usable.as_deref()).collect();
@@ -307,7 +249,7 @@ fn level(
     let usage_unit = (USAGE_SHARE * variance * (patch * patch) as f64) as f32;
     let rarity = PlaceCost::free(&source);
     let photos = Vec::new();
-    let unit = 1.0 / codes.scale;
+    let unit = codes.unit();
     let level = Level { size, source, quantiles, usage_unit, unit, patch_variance, rarity, photos };
     Some((level, flags))
 }

@@ -7,6 +7,7 @@
 //! only one instruction a row, but a table of `|e|^2`, and looking that up at random places costs
 //! more than it saves.)
 
+pub mod codes;
 mod scalar;
 mod simd;
 

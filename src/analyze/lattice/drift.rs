@@ -1,0 +1,207 @@
+//! [`Drift`]: how far a photo's cells lie beside the places that its lattice gives them.
+
+use rayon::prelude::*;
+
+use crate::search::patch::MatchImage;
+use crate::signal::basis::{Basis, Vector, area, coefficients, combined};
+
+/// Square roots of a cell's area, in pixels, at which cells are compared, coarse to fine, and by how many
+/// pixels each may be off there. The coarse look allows an eighth of a cell: more could as well be the
+/// next brick.
+pub const LOOKS: [(f64, i64); 2] = [(24.0, 3), (64.0, 2)];
+
+/// How often the mean cell is made anew from cells put into place, in each look.
+const ROUNDS: usize = 2;
+
+/// A cell that is this much farther off than the median of those around it, as a share of the root of
+/// its area, is taken for damaged rather than displaced.
+const OUTLIER: f64 = 0.04;
+
+/// A displacement for every cell of a lattice.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Drift {
+    /// The cells: the first coefficients and how many.
+    cells: [(i64, usize); 2],
+    /// To the right and downwards, in pixels of the photo; row by row of the first coefficient.
+    of: Vec<Vector>,
+}
+
+impl Drift {
+    /// None at all.
+    pub fn none() -> Self {
+        Self { cells: [(0, 1); 2], of: vec![[0.0; 2]] }
+    }
+
+    /// The displacements of the cells of a photo of `height` x `width`. `look(scale)` is the photo in
+    /// codes, reduced by that factor at most 1; what is not usable there does not matter much, as cells
+    /// that are unlike the mean cell are not believed.
+    ///
+    /// Each cell is moved to where it is most like the mean of all cells, by squared differences; that
+    /// mean is then made of the moved cells, and so on.
+    ///
+    /// # Determinism
+    /// Sums of integers; same bytes for any thread count.
+    pub fn measured(
+        basis: Basis,
+        (height, width): (usize, usize),
+        mut look: impl FnMut(f64) -> MatchImage,
+    ) -> Self {
+        let root = area(basis).sqrt();
+        let corners =
+            [[0.0, 0.0], [width as f64, 0.0], [0.0, height as f64], [width as f64, height as f64]];
+        let corners = corners.map(|c| coefficients(basis, c));
+        let cells = std::array::from_fn(|k| {
+            let low = corners.iter().map(|c| c[k]).fold(f64::MAX, f64::min).floor();
+            let high = corners.iter().map(|c| c[k]).fold(f64::MIN, f64::max).ceil();
+            (low as i64, (high - low) as usize + 1)
+        });
+        let mut drift = Self { cells, of: vec![[0.0; 2]; cells[0].1 * cells[1].1] };
+        let mut last = 0.0;
+        for (side, reach) in LOOKS {
+            let scale = (side / root).min(1.0);
+            if scale == last {
+                break;
+            }
+            last = scale;
+            let image = look(scale);
+            let scale =
+                [image.width() as f64 / width as f64, image.height() as f64 / height as f64];
+            for _ in 0..ROUNDS {
+                drift.improve(basis, &image, scale, reach, OUTLIER * root);
+            }
+        }
+        drift
+    }
+
+    /// The displacement at a place given by its coefficients, between those of the cells around it.
+    pub fn at(&self, a: f64, b: f64) -> Vector {
+        let along = |v: f64, (first, n): (i64, usize)| {
+            let v = (v - first as f64).clamp(0.0, (n - 1) as f64);
+            let low = (v as usize).min(n.saturating_sub(2));
+            (low, (low + 1).min(n - 1), v - low as f64)
+        };
+        let ((a0, a1, fa), (b0, b1, fb)) = (along(a, self.cells[0]), along(b, self.cells[1]));
+        let at = |a: usize, b: usize| self.of[a * self.cells[1].1 + b];
+        std::array::from_fn(|k| {
+            let near = at(a0, b0)[k] * (1.0 - fb) + at(a0, b1)[k] * fb;
+            let far = at(a1, b0)[k] * (1.0 - fb) + at(a1, b1)[k] * fb;
+            near * (1.0 - fa) + far * fa
+        })
+    }
+
+    /// One round: the mean cell, and every cell's place against it.
+    fn improve(
+        &mut self,
+        basis: Basis,
+        image: &MatchImage,
+        scale: [f64; 2],
+        reach: i64,
+        outlier: f64,
+    ) {
+        let size = std::array::from_fn(|k| {
+            ((basis[0][k].abs() + basis[1][k].abs()) * scale[k]).ceil().max(2.0) as usize
+        });
+        let [w, h] = size;
+        let n_b = self.cells[1].1;
+        let corner = |i: usize, of: Vector| {
+            let (a, b) = ((i / n_b) as i64 + self.cells[0].0, (i % n_b) as i64 + self.cells[1].0);
+            let [x, y] = combined(basis, a as f64, b as f64);
+            // The window has the node in its middle.
+            let x = ((x + of[0]) * scale[0] - w as f64 / 2.0).round() as i64;
+            let y = ((y + of[1]) * scale[1] - h as f64 / 2.0).round() as i64;
+            let fits = |p: i64, side: usize, all: usize| {
+                p >= reach && p + side as i64 + reach <= all as i64
+            };
+            (fits(x, w, image.width()) && fits(y, h, image.height())).then_some([x, y])
+        };
+        let corners: Vec<Option<[i64; 2]>> =
+            self.of.iter().enumerate().map(|(i, &of)| corner(i, of)).collect();
+        let whole: Vec<[i64; 2]> = corners.iter().flatten().copied().collect();
+        if whole.len() < 2 {
+            return;
+        }
+        let row = |y: i64, x: i64| image.codes_from(image.at(y as usize, x as usize), 4 * w);
+        let mut mean = vec![0u8; 4 * w * h];
+        mean.par_chunks_mut(4 * w).enumerate().for_each(|(dy, mean)| {
+            let mut sums = vec![0u32; mean.len()];
+            for &[x, y] in &whole {
+                let codes = row(y + dy as i64, x);
+                sums.iter_mut().zip(codes).for_each(|(sum, &code)| *sum += u32::from(code));
+            }
+            let n = whole.len() as u32;
+            mean.iter_mut().zip(sums).for_each(|(mean, sum)| *mean = ((sum + n / 2) / n) as u8);
+        });
+        let unlike = |x: i64, y: i64| -> u64 {
+            let rows = mean.chunks_exact(4 * w).enumerate();
+            rows.map(|(dy, mean)| u64::from(squared(mean, row(y + dy as i64, x)))).sum()
+        };
+        let found = |corner: &Option<[i64; 2]>| {
+            let [x, y] = (*corner)?;
+            let side = (2 * reach + 1) as usize;
+            let cost =
+                |i: usize| unlike(x + (i % side) as i64 - reach, y + (i / side) as i64 - reach);
+            let costs: Vec<u64> = (0..side * side).map(cost).collect();
+            let best = (0..costs.len()).min_by_key(|&i| costs[i])?;
+            let (by, bx) = (best / side, best % side);
+            // Beyond what was looked at there may be better: it is not known.
+            if by == 0 || bx == 0 || by + 1 == side || bx + 1 == side {
+                return None;
+            }
+            let vertex = |step: usize| {
+                let [before, here, after] =
+                    [best - step, best, best + step].map(|i| costs[i] as f64);
+                let bend = before + after - 2.0 * here;
+                if bend > 0.0 { 0.5 * (before - after) / bend } else { 0.0 }
+            };
+            let x = (bx as i64 - reach) as f64 + vertex(1);
+            let y = (by as i64 - reach) as f64 + vertex(side);
+            Some([x, y])
+        };
+        let shifts: Vec<Option<Vector>> = corners.par_iter().map(found).collect();
+        let moved = |i: usize| -> Option<Vector> {
+            let ([x, y], [dx, dy]) = (corners[i]?, shifts[i]?);
+            let (a, b) = ((i / n_b) as i64 + self.cells[0].0, (i % n_b) as i64 + self.cells[1].0);
+            let [px, py] = combined(basis, a as f64, b as f64);
+            let x = (x as f64 + dx + w as f64 / 2.0) / scale[0] - px;
+            let y = (y as f64 + dy + h as f64 / 2.0) / scale[1] - py;
+            Some([x, y])
+        };
+        let moved: Vec<Option<Vector>> = (0..self.of.len()).map(moved).collect();
+        self.of = settled(&moved, self.cells[1].1, outlier);
+    }
+}
+
+/// A displacement for every cell: its own if it is like those around it, else their median; cells
+/// without one take that of the nearest rows and columns.
+fn settled(moved: &[Option<Vector>], columns: usize, outlier: f64) -> Vec<Vector> {
+    let rows = moved.len() / columns;
+    let around = |i: usize, reach: usize| -> Option<Vector> {
+        let (r, c) = (i / columns, i % columns);
+        let near = |at: usize, n: usize| at.saturating_sub(reach)..(at + reach + 1).min(n);
+        let all = near(r, rows).flat_map(|r| near(c, columns).map(move |c| r * columns + c));
+        let all: Vec<Vector> = all.filter_map(|j| moved[j]).collect();
+        let median = |k: usize| {
+            let mut values: Vec<f64> = all.iter().map(|v| v[k]).collect();
+            values.sort_unstable_by(f64::total_cmp);
+            let n = values.len();
+            0.5 * (values[(n - 1) / 2] + values[n / 2])
+        };
+        (!all.is_empty()).then(|| [median(0), median(1)])
+    };
+    let one = |i: usize| {
+        let median = (1..=rows.max(columns)).find_map(|reach| around(i, reach)).unwrap_or_default();
+        match moved[i] {
+            Some(own) if (own[0] - median[0]).abs().max((own[1] - median[1]).abs()) <= outlier => {
+                own
+            }
+            _ => median,
+        }
+    };
+    (0..moved.len()).into_par_iter().map(one).collect()
+}
+
+/// The sum of squared differences of codes.
+fn squared(a: &[u8], b: &[u8]) -> u32 {
+    let square = |(&a, &b): (&u8, &u8)| u32::from(a.abs_diff(b)).pow(2);
+    a.iter().zip(b).map(square).sum()
+}
