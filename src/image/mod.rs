@@ -1,5 +1,6 @@
 //! Room 1: what a picture is, where its pixels come from, and how it is read and written.
 
+pub mod blend;
 pub mod color;
 pub mod io;
 pub mod mask;

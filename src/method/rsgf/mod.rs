@@ -1,9 +1,11 @@
 //! Random sampling and gap filling: near-regular textures of any size from patches of a photo that
 //! lie where its lattice says.
 
+mod deform;
 mod gap;
 mod grid;
 mod places;
+mod seam;
 
 use std::collections::BTreeMap;
 
@@ -16,9 +18,9 @@ use crate::base::rng::Rng;
 use crate::image::color::ColorModel;
 use crate::image::mask::Mask;
 use crate::image::picture::Picture;
-use crate::search::cut::{self, Division};
 use crate::search::patch::MatchImage;
 use crate::search::patch::codes::Codes;
+use crate::search::patchmatch::Wrap;
 use crate::signal::basis::Basis;
 use crate::signal::resample::resized;
 use gap::Frame;
@@ -36,27 +38,40 @@ pub enum Seam {
     Linear,
 }
 
+/// By what a gap's patch is chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Matching {
+    /// Squared differences of colours.
+    Color,
+    /// Normalized cross-correlation.
+    Correlation,
+}
+
 /// What is to be made.
 #[derive(Debug, Clone)]
 pub struct Plan {
     /// Height and width of the output.
     pub size: (usize, usize),
-    /// Whether it repeats.
-    pub tileable: bool,
+    /// On which axes it repeats.
+    pub wrap: Wrap,
     /// Side of a block.
     pub block: usize,
-    /// How far patches reach over their block.
+    /// How far patches reach over their block; at most half of it.
     pub border: usize,
-    /// The lattice in the photo, and in the output.
-    pub source: Basis,
-    /// The lattice in the output, where it may be a little stretched.
-    pub output: Basis,
-    /// How far from their place on the lattice gap patches may lie.
-    pub tolerance: usize,
+    /// The lattice in the photo, and in the output, where it may be a little stretched.
+    pub lattices: [Basis; 2],
     /// How many places on the lattice are tried for a gap.
     pub candidates: usize,
-    /// How patches are joined.
+    /// How far from its place on the lattice a gap's patch may lie.
+    pub tolerance: usize,
+    /// By what it is chosen.
+    pub matching: Matching,
+    /// How far it may be bent to meet its neighbours.
+    pub deform: usize,
+    /// How it is joined to them.
     pub seam: Seam,
+    /// How far the sides of a cut are faded into each other.
+    pub feather: usize,
 }
 
 /// The photo in the matching space.
@@ -70,14 +85,22 @@ pub struct Exemplar {
 }
 
 impl Exemplar {
-    /// The photo, and where it may be used.
-    pub fn new(photo: &Picture, mask: Option<&Mask>, lattice: Option<Basis>) -> Self {
+    /// The photo, and where it may be used. With a lattice it is found out how far each of its cells
+    /// lies beside its place, and patches are taken from where the cell is.
+    pub fn new(photo: &Picture, mask: Option<&Mask>, straightened: Option<Basis>) -> Self {
         let size = (photo.height(), photo.width());
         let model = ColorModel::new(photo);
         let pixels = model.averaging_pixels(photo);
         let usable = mask.map(Mask::usable);
         let codes = Codes::covering(&[(&pixels, usable)], model.space());
         let image = codes.image(&pixels, size, model.space());
+        let drift = straightened.map_or_else(Drift::none, |basis| {
+            Drift::measured(basis, size, |scale| {
+                let to = |n: usize| (n as f64 * scale).round().max(1.0) as usize;
+                let to = (to(size.0), to(size.1));
+                codes.image(&resized(&pixels, size, to), to, model.space())
+            })
+        });
         let unusable = usable.map(|usable| {
             let (h, w) = size;
             let mut sums = vec![0; (h + 1) * (w + 1)];
@@ -90,19 +113,19 @@ impl Exemplar {
             }
             sums
         });
-        let drift = lattice.map_or_else(Drift::none, |basis| {
-            Drift::measured(basis, size, |scale| {
-                let to = [size.0, size.1].map(|n| (n as f64 * scale).round().max(1.0) as usize);
-                let small = resized(&pixels, size, (to[0], to[1]));
-                codes.image(&small, (to[0], to[1]), model.space())
-            })
-        });
         Self { image, drift, unusable }
     }
 
-    /// Whether a window with this top left corner can be copied.
-    fn fits(&self, [y, x]: Offset, (height, width): (usize, usize)) -> bool {
-        let (h, w) = (self.image.height() as i64, self.image.width() as i64);
+    /// How far its cells lie beside the lattice.
+    pub fn drift(&self) -> &Drift {
+        &self.drift
+    }
+
+    /// Whether a window with this top left corner, and `margin` around it, can be copied.
+    fn fits(&self, [y, x]: Offset, (height, width): (usize, usize), margin: usize) -> bool {
+        let (h, w, m) = (self.image.height() as i64, self.image.width() as i64, margin as i64);
+        let (y, x) = (y - m, x - m);
+        let (height, width) = (height + 2 * margin, width + 2 * margin);
         if y < 0 || x < 0 || y + height as i64 > h || x + width as i64 > w {
             return false;
         }
@@ -112,6 +135,9 @@ impl Exemplar {
         at(y + height, x + width) + at(y, x) == at(y + height, x) + at(y, x + width)
     }
 }
+
+/// A place of the photo: row, column.
+type Place = [i32; 2];
 
 /// Some rows of the output.
 #[derive(Debug)]
@@ -125,16 +151,13 @@ pub struct Strip {
     pub mixed: Vec<([u32; 2], u8)>,
 }
 
-/// A filled gap.
+/// A filled gap: of every pixel of its window, row by row, what of the photo it shows and how much of
+/// the gap is in it, in 255ths.
 #[derive(Debug)]
 struct Filled {
-    offset: Offset,
-    /// How much of every pixel of the window is the gap's, in 255ths.
-    share: Vec<u8>,
+    places: Vec<Place>,
+    shares: Vec<u8>,
 }
-
-/// Side of the squares in which seams are first looked for. Larger is faster and finds fewer detours.
-const STEP: usize = 4;
 
 const SAMPLE_STAGE: u32 = 0x5247_0001;
 const GAP_STAGE: u32 = 0x5247_0002;
@@ -153,19 +176,23 @@ impl<'a> Mosaic<'a> {
     /// The blocks of an output.
     pub fn new(exemplar: &'a Exemplar, plan: &'a Plan) -> Self {
         let size = (exemplar.image.height(), exemplar.image.width());
-        let axis = |side| Axis::new(side, plan.block, plan.tileable);
         Self {
             exemplar,
             plan,
-            places: Places::new(plan.source, plan.output, exemplar.drift.clone(), size),
-            rows: axis(plan.size.0),
-            columns: axis(plan.size.1),
+            places: Places::new(plan.lattices, exemplar.drift.clone(), size),
+            rows: Axis::new(plan.size.0, plan.block, plan.wrap.y),
+            columns: Axis::new(plan.size.1, plan.block, plan.wrap.x),
         }
     }
 
     /// How many rows of blocks there are.
     pub fn block_rows(&self) -> usize {
         self.rows.blocks
+    }
+
+    /// Steps of progress that [`strip`](Self::strip) counts for these rows of blocks.
+    pub fn work(&self, block_rows: std::ops::Range<usize>) -> u64 {
+        2 * self.gaps(block_rows).len() as u64
     }
 
     fn own(&self, [r, c]: Block) -> Block {
@@ -179,7 +206,7 @@ impl<'a> Mosaic<'a> {
     fn lenses(&self, [r, c]: Block) -> Lenses {
         let height = (self.rows.edge(r + 1) - self.rows.edge(r)) as usize;
         let width = (self.columns.edge(c + 1) - self.columns.edge(c)) as usize;
-        Lenses { size: (height, width), border: self.plan.border }
+        Lenses { size: (height, width), border: self.plan.border.min(height / 2).min(width / 2) }
     }
 
     fn rng(&self, ctx: &Ctx, stage: u32, [r, c]: Block) -> Rng {
@@ -193,25 +220,16 @@ impl<'a> Mosaic<'a> {
         (y as f64 + height as f64 / 2.0, x as f64 + width as f64 / 2.0)
     }
 
-    /// The window's corner in the photo.
+    /// The window's corner in the photo under an offset, in the output under none.
     fn window_at(&self, block: Block, offset: Offset) -> Offset {
         let [y, x] = self.corner(block);
-        let border = self.plan.border as i64;
+        let border = self.lenses(block).border as i64;
         [y + offset[0] - border, x + offset[1] - border]
     }
 
     /// Whether a patch of a block can be copied from there.
-    fn fits(&self, block: Block, offset: Offset) -> bool {
-        self.exemplar.fits(self.window_at(block, offset), self.lenses(block).window())
-    }
-
-    /// Random sampling (paper, sec. 4.1).
-    fn sample(&self, ctx: &Ctx, block: Block) -> Result<Offset> {
-        let own = self.own(block);
-        let mut rng = self.rng(ctx, SAMPLE_STAGE, own);
-        let drawn = self.places.draw(&mut rng, self.middle(own), |o| self.fits(own, o));
-        let Some(offset) = drawn else { return Err(self.nowhere(own)) };
-        Ok(self.moved(own, block, offset))
+    fn fits(&self, block: Block, offset: Offset, margin: usize) -> bool {
+        self.exemplar.fits(self.window_at(block, offset), self.lenses(block).window(), margin)
     }
 
     /// What a block's offset is for the same block one round away.
@@ -225,10 +243,18 @@ impl<'a> Mosaic<'a> {
         Error::BadPicture {
             what: "the photo".into(),
             reason: format!(
-                "its usable part has no {width}x{height} pixels at some place of the lattice; choose \
-                 a smaller block or use more of the photo"
+                "at some place of the lattice it has no usable {width}x{height} pixels (a block and \
+                 its border); choose a smaller block or use more of the photo"
             ),
         }
+    }
+
+    /// Random sampling (paper, sec. 4.1).
+    fn sample(&self, ctx: &Ctx, block: Block) -> Result<Offset> {
+        let own = self.own(block);
+        let mut rng = self.rng(ctx, SAMPLE_STAGE, own);
+        let drawn = self.places.draw(&mut rng, self.middle(own), |o| self.fits(own, o, 0));
+        drawn.map(|offset| self.moved(own, block, offset)).ok_or_else(|| self.nowhere(own))
     }
 
     /// The offsets of the samples around a gap, in the order of [`Side::ALL`].
@@ -240,298 +266,234 @@ impl<'a> Mosaic<'a> {
         Ok(offsets)
     }
 
-    /// The colour that the photo has at a pixel of a block's window under an offset.
-    fn color(&self, block: Block, offset: Offset, (y, x): (usize, usize)) -> Option<[u8; 4]> {
-        let [oy, ox] = self.window_at(block, offset);
-        let (y, x) = (usize::try_from(oy + y as i64).ok()?, usize::try_from(ox + x as i64).ok()?);
-        let image = &self.exemplar.image;
-        (y < image.height() && x < image.width()).then(|| image.pixel(y, x))
-    }
-
     /// Gap filling (paper, sec. 4.2): the offset of the patch whose frame fits best.
     fn fill(&self, ctx: &Ctx, block: Block) -> Result<Offset> {
         let lenses = self.lenses(block);
-        let neighbors = self.around(ctx, block)?;
+        let window = lenses.window();
         let image = &self.exemplar.image;
-        let frame = Frame::new(&lenses, |side, at| {
-            self.color(block, neighbors[side as usize], at).unwrap_or_default()
+        let corners = self.around(ctx, block)?.map(|o| self.window_at(block, o));
+        let frame = Frame::new(&lenses, |side, (y, x)| {
+            let [wy, wx] = corners[side as usize];
+            image.pixel((wy + y as i64) as usize, (wx + x as i64) as usize)
         });
         let mut rng = self.rng(ctx, GAP_STAGE, block);
-        let fits = |o: Offset| self.fits(block, o);
-        let places = self.places.several(&mut rng, self.middle(block), self.plan.candidates, fits);
-        let at: Vec<Offset> = places.iter().map(|&o| self.window_at(block, o)).collect();
-        let window = lenses.window();
-        let nearest =
-            gap::nearest_in_color(ctx.simd, image, &frame, &at, self.plan.tolerance, |p| {
-                self.exemplar.fits(p, window)
-            });
-        let Some(place) = nearest else { return Err(self.nowhere(block)) };
+        let (candidates, bend) = (self.plan.candidates, self.plan.deform);
+        let fits = |o: Offset| self.fits(block, o, bend);
+        let places = self.places.several(&mut rng, self.middle(block), candidates, fits);
+        let places: Vec<Offset> = places.iter().map(|&o| self.window_at(block, o)).collect();
+        let how = (ctx.simd, self.plan.matching);
+        let nearest = gap::nearest(how, image, &frame, &places, self.plan.tolerance, |place| {
+            self.exemplar.fits(place, window, bend)
+        });
+        let [y, x] = nearest.ok_or_else(|| self.nowhere(block))?;
         let [wy, wx] = self.window_at(block, [0, 0]);
-        Ok([place[0] - wy, place[1] - wx])
+        Ok([y - wy, x - wx])
     }
 
-    /// How much of every pixel of its window a gap takes, in 255ths: fading or cut along its sides.
-    fn share_by_side(&self, ctx: &Ctx, block: Block, offset: Offset) -> Result<Vec<u8>> {
-        let lenses = self.lenses(block);
-        let window = lenses.window();
-        let mut share: Vec<u8> = pixels(window)
-            .map(|at| match lenses.at(at) {
-                Some((_, depth)) => (127.5 * (depth + 1.0)).round() as u8,
-                None if lenses.is_own(at) => 255,
-                None => 0,
-            })
-            .collect();
-        if self.plan.seam == Seam::Cut {
-            let neighbors = self.around(ctx, block)?;
-            for (side, neighbor) in Side::ALL.into_iter().zip(neighbors) {
-                let between = |at| {
-                    let color = |offset| self.color(block, offset, at).unwrap_or_default();
-                    difference(color(offset), color(neighbor))
-                };
-                self.cut(&lenses, side, between, &mut share);
-            }
-        }
-        Ok(share)
-    }
-
-    /// The same by graph cut (Kwatra et al. 2003): what lies there already is `old`, an offset for
-    /// every pixel of the window.
-    fn share_by_graph(&self, block: Block, offset: Offset, old: &[Offset]) -> Vec<u8> {
-        let lenses = self.lenses(block);
-        let (height, width) = lenses.window();
-        let color = |offset: Offset, at| self.color(block, offset, at);
-        // How visible a seam between two patches is at a pixel. Where one ends, nobody knows.
-        let step = |a: Offset, b: Offset, at: (usize, usize)| {
-            color(a, at).zip(color(b, at)).map_or(0, |(a, b)| visible(a, b))
-        };
-        let own: Vec<i32> =
-            pixels((height, width)).map(|at| step(old[at.0 * width + at.1], offset, at)).collect();
-        let mut division = Division::new(height, width);
-        for at in pixels((height, width)) {
-            for below in [false, true] {
-                let next = if below { (at.0 + 1, at.1) } else { (at.0, at.1 + 1) };
-                if next.0 == height || next.1 == width {
-                    continue;
-                }
-                let (p, q) = (at.0 * width + at.1, next.0 * width + next.1);
-                let (a, b) = (old[p], old[q]);
-                let costs = if a == b {
-                    [0, own[p] + own[q], own[p] + own[q]]
-                } else {
-                    let none = step(a, b, at) + step(a, b, next);
-                    let other = own[p] + step(a, offset, next);
-                    let this = step(b, offset, at) + own[q];
-                    // Less only where a patch ends.
-                    [none.min(other + this), other, this]
-                };
-                division.pair(at, below, costs);
-            }
-        }
-        for at in pixels((height, width)) {
-            let rim = at.0 == 0 || at.1 == 0 || at.0 + 1 == height || at.1 + 1 == width;
-            if rim || lenses.is_core(at) {
-                division.bind(at, !rim);
-            }
-        }
-        division
-            .solve_by_steps(STEP)
-            .into_iter()
-            .map(|inside| if inside { 255 } else { 0 })
-            .collect()
-    }
-
-    /// Joins a gap and its neighbour by the path of least difference.
-    fn cut(
-        &self,
-        lenses: &Lenses,
-        side: Side,
-        difference: impl Fn((usize, usize)) -> u32,
-        share: &mut [u8],
-    ) {
-        let b = self.plan.border;
-        let (height, width) = lenses.size;
-        let along = if matches!(side, Side::Top | Side::Bottom) { width } else { height };
-        // From the neighbour inwards, along the side.
-        let pixel = |j: usize, i: usize| match side {
-            Side::Top => (j, b + i),
-            Side::Bottom => (height + 2 * b - 1 - j, b + i),
-            Side::Left => (b + i, j),
-            Side::Right => (b + i, width + 2 * b - 1 - j),
-        };
-        let rows = 2 * b + 1;
-        let mut costs = vec![cut::BARRED; rows * along];
-        for i in 0..along {
-            let reach = b.min(i).min(along - 1 - i);
-            for p in b - reach..=b + reach {
-                let behind = p.checked_sub(1).map_or(0, |j| difference(pixel(j, i)));
-                let ahead = if p < 2 * b { difference(pixel(p, i)) } else { 0 };
-                costs[p * along + i] = behind + ahead;
-            }
-        }
-        let path = cut::path(&costs, rows, along);
-        for (i, p) in path.into_iter().enumerate() {
-            let reach = b.min(i).min(along - 1 - i);
-            for j in b - reach..b + reach {
-                let (y, x) = pixel(j, i);
-                share[y * lenses.window().1 + x] = if j >= p { 255 } else { 0 };
-            }
-        }
-    }
-
-    /// The rows of the output that some rows of blocks cover.
-    ///
-    /// # Errors
-    /// [`Error::BadPicture`] if nothing fits at some place, [`Error::Cancelled`].
-    pub fn strip(&self, ctx: &Ctx, block_rows: std::ops::Range<usize>) -> Result<Strip> {
-        let (first, last) = (block_rows.start as i64, block_rows.end as i64);
-        let columns = self.columns.blocks as i64;
-        // The gaps that reach in, and those that these have to know. Beyond a border that does not wrap
-        // there are none: samples alone reach the border.
-        let around = |range: std::ops::Range<i64>, axis: &Axis| {
+    /// The gaps that reach into these rows of blocks, and those that these have to know. Beyond a border
+    /// that does not wrap there are none: samples alone reach over it.
+    fn gaps(&self, block_rows: std::ops::Range<usize>) -> Vec<Block> {
+        let within = |range: std::ops::Range<i64>, axis: &Axis| {
             let all = 0..axis.blocks as i64;
             if axis.wraps { range } else { range.start.max(all.start)..range.end.min(all.end) }
         };
-        let gaps: Vec<Block> = around(first - 2..last + 2, &self.rows)
-            .flat_map(|r| around(-2..columns + 2, &self.columns).map(move |c| [r, c]))
-            .filter(|&block| !is_sample(block))
-            .collect();
-        let offsets = gaps.par_iter().map(|&block| {
-            let own = self.own(block);
-            let offset = self.moved(own, block, self.fill(ctx, own)?);
-            ctx.step(1)?;
-            Ok((block, Filled { offset, share: Vec::new() }))
-        });
-        let mut gaps: BTreeMap<Block, Filled> = offsets.collect::<Result<_>>()?;
-        if self.plan.seam == Seam::Graph {
-            // First the gaps of every other row: their windows do not overlap. Then the others, which
-            // see what the first have come to.
-            for turn in [0, 1] {
-                let shares = gaps.par_iter().filter(|([r, _], _)| r.rem_euclid(2) == turn).map(
-                    |(&block, gap)| {
-                        let old = self.old(ctx, block, &gaps)?;
-                        ctx.step(1)?;
-                        Ok((block, self.share_by_graph(block, gap.offset, &old)))
-                    },
-                );
-                for (block, share) in shares.collect::<Result<Vec<_>>>()? {
-                    if let Some(gap) = gaps.get_mut(&block) {
-                        gap.share = share;
-                    }
-                }
-            }
-        } else {
-            gaps.par_iter_mut().try_for_each(|(&block, gap)| {
-                gap.share = self.share_by_side(ctx, block, gap.offset)?;
-                ctx.step(1)
-            })?;
-        }
-        let (height, width) = self.plan.size;
-        let begin = self.rows.edge(first) as usize;
-        let end = (self.rows.edge(last) as usize).min(height);
-        let mut from = vec![[0; 2]; (end - begin) * width];
-        let mixes = self.plan.seam == Seam::Linear;
-        let mut mixed = vec![([0; 2], 0); if mixes { from.len() } else { 0 }];
-        let place = |[oy, ox]: Offset, [y, x]: [i64; 2]| [(y + oy) as u32, (x + ox) as u32];
-        let inside = |[y, x]: [i64; 2]| {
-            let inside = (begin as i64..end as i64).contains(&y) && (0..width as i64).contains(&x);
-            inside.then(|| (y as usize - begin) * width + x as usize)
-        };
-        for block in (first..last).flat_map(|r| (0..columns).map(move |c| [r, c])) {
-            let [y0, x0] = self.corner(block);
-            let size = self.lenses(block).size;
-            let sample = is_sample(block).then(|| self.sample(ctx, block)).transpose()?;
-            let around = if sample.is_none() { self.around(ctx, block)? } else { [[0; 2]; 4] };
-            for (y, x) in pixels(size) {
-                let at = [y0 + y as i64, x0 + x as i64];
-                let offset = sample.unwrap_or_else(|| around[nearest_side(size, (y, x)) as usize]);
-                if let Some(k) = inside(at) {
-                    from[k] = place(offset, at);
-                    if mixes {
-                        mixed[k] = (from[k], 0);
-                    }
-                }
-            }
-        }
-        for turn in [0, 1] {
-            for (&block, gap) in gaps.iter().filter(|([r, _], _)| r.rem_euclid(2) == turn) {
-                let [wy, wx] = self.window_at(block, [0, 0]);
-                let window = self.lenses(block).window();
-                for ((y, x), &share) in pixels(window).zip(&gap.share) {
-                    let at = [wy + y as i64, wx + x as i64];
-                    let Some(k) = inside(at).filter(|_| share > 0) else { continue };
-                    let (old, new) = (from[k], place(gap.offset, at));
-                    from[k] = if share >= 128 { new } else { old };
-                    if mixes {
-                        mixed[k] = if share >= 128 { (old, 255 - share) } else { (new, share) };
-                    }
-                }
-            }
-        }
-        Ok(Strip { first: begin, from, mixed })
+        let rows = within(block_rows.start as i64 - 2..block_rows.end as i64 + 2, &self.rows);
+        let columns = within(-2..self.columns.blocks as i64 + 2, &self.columns);
+        rows.flat_map(|r| columns.clone().map(move |c| [r, c])).filter(|&b| !is_sample(b)).collect()
     }
 
-    /// What lies in a gap's window before the gap is joined: samples, and gaps that were.
-    fn old(&self, ctx: &Ctx, block: Block, gaps: &BTreeMap<Block, Filled>) -> Result<Vec<Offset>> {
+    /// Fills gaps that do not reach into each other.
+    fn filled(
+        &self,
+        ctx: &Ctx,
+        blocks: &[(Block, Offset)],
+        before: &BTreeMap<Block, Filled>,
+    ) -> Result<Vec<(Block, Filled)>> {
+        let one = |&(block, offset): &(Block, Offset)| {
+            let (image, lenses) = (&self.exemplar.image, self.lenses(block));
+            let old = self.old(ctx, block, before)?;
+            let corner = self.window_at(block, offset).map(|v| v as i32);
+            let places = deform::bent(image, &lenses, corner, &old, self.plan.deform);
+            let shares = match self.plan.seam {
+                Seam::Graph => seam::cut_by_graph(image, &lenses, &places, &old),
+                Seam::Cut => seam::cut_along_sides(image, &lenses, &places, &old),
+                Seam::Linear => seam::faded(&lenses),
+            };
+            // The windows' rims are not the gap's, and stay so.
+            let reach = self.plan.feather.min(lenses.border.saturating_sub(1));
+            let shares = match self.plan.seam {
+                Seam::Linear => shares,
+                Seam::Graph | Seam::Cut => seam::feathered(&lenses, &shares, reach),
+            };
+            ctx.step(1)?;
+            Ok((block, Filled { places, shares }))
+        };
+        blocks.par_iter().map(one).collect()
+    }
+
+    /// What lies in a gap's window before the gap is joined: samples, and the gaps `before`.
+    fn old(&self, ctx: &Ctx, block: Block, before: &BTreeMap<Block, Filled>) -> Result<Vec<Place>> {
         let lenses = self.lenses(block);
         let window = lenses.window();
-        let b = self.plan.border;
         let around = self.around(ctx, block)?;
         let [wy, wx] = self.window_at(block, [0, 0]);
-        let mut old: Vec<Offset> = pixels(window)
-            .map(|(y, x)| {
-                let beyond = |i: usize, n: usize| {
-                    if i < b { -1 } else { i64::from(i >= b + n) }
-                };
-                let [dr, dc] = [beyond(y, lenses.size.0), beyond(x, lenses.size.1)];
-                let side = match [dr, dc] {
-                    [-1, 0] => Side::Top,
-                    [1, 0] => Side::Bottom,
-                    [0, -1] => Side::Left,
-                    [0, 1] => Side::Right,
-                    _ => {
-                        // In this gap or in one at a corner.
-                        let there = [block[0] + dr, block[1] + dc];
-                        let [cy, cx] = self.corner(there);
-                        let at = ((wy + y as i64 - cy) as usize, (wx + x as i64 - cx) as usize);
-                        let side = nearest_side(self.lenses(there).size, at);
-                        let sample = side.beyond(there);
-                        Side::ALL.into_iter().find(|s| s.beyond(block) == sample).unwrap_or(side)
-                    }
-                };
-                around[side as usize]
-            })
-            .collect();
-        if block[0].rem_euclid(2) == 0 {
-            return Ok(old);
-        }
+        let beyond = |i: usize, n: usize| match i.checked_sub(lenses.border) {
+            None => -1,
+            Some(i) => i64::from(i >= n),
+        };
+        let place = |(y, x): (usize, usize)| {
+            let (oy, ox) = (wy + y as i64, wx + x as i64);
+            let side = match [beyond(y, lenses.size.0), beyond(x, lenses.size.1)] {
+                [-1, 0] => Side::Top,
+                [1, 0] => Side::Bottom,
+                [0, -1] => Side::Left,
+                [0, 1] => Side::Right,
+                [dr, dc] => {
+                    // In this gap or in one at a corner: the sample that is nearest there.
+                    let there = [block[0] + dr, block[1] + dc];
+                    let [cy, cx] = self.corner(there);
+                    let at = ((oy - cy) as usize, (ox - cx) as usize);
+                    let sample = nearest_side(self.lenses(there).size, at).beyond(there);
+                    Side::ALL.into_iter().find(|s| s.beyond(block) == sample).unwrap_or(Side::Top)
+                }
+            };
+            let [dy, dx] = around[side as usize];
+            [(oy + dy) as i32, (ox + dx) as i32]
+        };
+        let mut old: Vec<Place> = pixels(window).map(place).collect();
         for corner in [[-1, -1], [-1, 1], [1, -1], [1, 1]] {
             let there = [block[0] + corner[0], block[1] + corner[1]];
-            let Some(gap) = gaps.get(&there) else { continue };
-            let [cy, cx] = self.window_at(there, [0, 0]);
+            let Some(gap) = before.get(&there) else { continue };
+            let [gy, gx] = self.window_at(there, [0, 0]);
             let size = self.lenses(there).window();
-            for ((y, x), &share) in pixels(size).zip(&gap.share) {
-                let (y, x) = (cy + y as i64 - wy, cx + x as i64 - wx);
-                let inside = |i: i64, n: usize| (0..n as i64).contains(&i);
-                if share > 0 && inside(y, window.0) && inside(x, window.1) {
-                    old[y as usize * window.1 + x as usize] = gap.offset;
+            let all = pixels(size).zip(gap.places.iter().zip(&gap.shares));
+            for ((y, x), (&place, _)) in all.filter(|(_, (_, share))| **share >= 128) {
+                let (y, x) = (gy + y as i64 - wy, gx + x as i64 - wx);
+                if (0..window.0 as i64).contains(&y) && (0..window.1 as i64).contains(&x) {
+                    old[y as usize * window.1 + x as usize] = place;
                 }
             }
         }
         Ok(old)
+    }
+
+    /// The rows of the output that some rows of blocks cover. All strips together are the whole, however
+    /// it is divided.
+    ///
+    /// # Errors
+    /// [`Error::BadPicture`] if nothing fits at some place, [`Error::Cancelled`].
+    pub fn strip(&self, ctx: &Ctx, block_rows: std::ops::Range<usize>) -> Result<Strip> {
+        let gaps = self.gaps(block_rows.clone());
+        let offsets = gaps.par_iter().map(|&block| {
+            let own = self.own(block);
+            let offset = self.moved(own, block, self.fill(ctx, own)?);
+            ctx.step(1)?;
+            Ok((block, offset))
+        });
+        let offsets: Vec<(Block, Offset)> = offsets.collect::<Result<_>>()?;
+        // First the gaps of every other row: they do not reach into each other. Then the others, which
+        // see what the first have come to, where seams may go anywhere.
+        let (mut first, mut second) = (offsets.clone(), offsets);
+        first.retain(|([r, _], _)| r.rem_euclid(2) == 0);
+        second.retain(|([r, _], _)| r.rem_euclid(2) == 1);
+        let first: BTreeMap<Block, Filled> =
+            self.filled(ctx, &first, &BTreeMap::new())?.into_iter().collect();
+        let before = if self.plan.seam == Seam::Graph { &first } else { &BTreeMap::new() };
+        let second = self.filled(ctx, &second, before)?;
+        let filled: Vec<(Block, Filled)> = first.into_iter().chain(second).collect();
+        self.painted(ctx, block_rows, &filled)
+    }
+
+    /// Puts samples and gaps together, the gaps in this order.
+    fn painted(
+        &self,
+        ctx: &Ctx,
+        block_rows: std::ops::Range<usize>,
+        filled: &[(Block, Filled)],
+    ) -> Result<Strip> {
+        let (height, width) = self.plan.size;
+        let rows = block_rows.start as i64..block_rows.end as i64;
+        let bottom = |r: i64| (self.rows.edge(r) as usize).min(height);
+        let begin = bottom(rows.start);
+        let mut from = vec![[0; 2]; (bottom(rows.end) - begin) * width];
+        let mixes = self.plan.seam == Seam::Linear || self.plan.feather > 0;
+        let mut mixed = vec![([0; 2], 0); if mixes { from.len() } else { 0 }];
+        // A row of blocks each, so that they can be painted side by side.
+        let mut bands = Vec::new();
+        let (mut from_rest, mut mixed_rest) = (&mut from[..], &mut mixed[..]);
+        for r in rows {
+            let n = (bottom(r + 1) - bottom(r)) * width;
+            let (own, rest) = from_rest.split_at_mut(n);
+            from_rest = rest;
+            let (own_mixed, rest) = mixed_rest.split_at_mut(if mixes { n } else { 0 });
+            mixed_rest = rest;
+            bands.push((r, own, own_mixed));
+        }
+        bands.into_par_iter().try_for_each(|(r, from, mixed)| {
+            let top = bottom(r) as i64;
+            let rows = top..bottom(r + 1) as i64;
+            for c in 0..self.columns.blocks as i64 {
+                self.paint_samples(ctx, [r, c], &rows, from)?;
+            }
+            for (place, mixed) in from.iter().zip(mixed.iter_mut()) {
+                *mixed = (*place, 0);
+            }
+            for (block, gap) in filled.iter().filter(|([row, _], _)| row.abs_diff(r) <= 1) {
+                let [wy, wx] = self.window_at(*block, [0, 0]);
+                let window = self.lenses(*block).window();
+                for (y, line) in (wy..).zip(0..window.0).filter(|(y, _)| rows.contains(y)) {
+                    let columns = wx.max(0)..(wx + window.1 as i64).min(width as i64);
+                    for x in columns {
+                        let i = line * window.1 + (x - wx) as usize;
+                        let share = gap.shares[i];
+                        if share == 0 {
+                            continue;
+                        }
+                        let k = (y - top) as usize * width + x as usize;
+                        let (old, new) = (from[k], gap.places[i].map(|v| v as u32));
+                        from[k] = if share >= 128 { new } else { old };
+                        if mixes {
+                            // Of nothing it is not even known where it would come from.
+                            mixed[k] = match share {
+                                255 => (new, 0),
+                                128..255 => (old, 255 - share),
+                                _ => (new, share),
+                            };
+                        }
+                    }
+                }
+            }
+            ctx.step(0)
+        })?;
+        Ok(Strip { first: begin, from, mixed })
+    }
+
+    /// A block of one sample, or a gap's of the four around it as far as they reach.
+    fn paint_samples(
+        &self,
+        ctx: &Ctx,
+        block: Block,
+        rows: &std::ops::Range<i64>,
+        from: &mut [[u32; 2]],
+    ) -> Result<()> {
+        let width = self.plan.size.1;
+        let [y0, x0] = self.corner(block);
+        let size = self.lenses(block).size;
+        let sample = is_sample(block).then(|| self.sample(ctx, block)).transpose()?;
+        let around = if sample.is_none() { self.around(ctx, block)? } else { [[0; 2]; 4] };
+        for y in y0..(y0 + size.0 as i64).min(rows.end) {
+            for x in x0..(x0 + size.1 as i64).min(width as i64) {
+                let at = ((y - y0) as usize, (x - x0) as usize);
+                let [oy, ox] = sample.unwrap_or_else(|| around[nearest_side(size, at) as usize]);
+                from[(y - rows.start) as usize * width + x as usize] =
+                    [(y + oy) as u32, (x + ox) as u32];
+            }
+        }
+        Ok(())
     }
 }
 
 /// The pixels of a rectangle, row by row.
 fn pixels((height, width): (usize, usize)) -> impl Iterator<Item = (usize, usize)> {
     (0..height).flat_map(move |y| (0..width).map(move |x| (y, x)))
-}
-
-/// Squared difference of two colours.
-fn difference(a: [u8; 4], b: [u8; 4]) -> u32 {
-    a.iter().zip(b).map(|(&a, b)| u32::from(a.abs_diff(b)).pow(2)).sum()
-}
-
-/// How much the eye is caught by one colour in place of another; a metric.
-fn visible(a: [u8; 4], b: [u8; 4]) -> i32 {
-    a.iter().zip(b).map(|(&a, b)| i32::from(a.abs_diff(b))).sum()
 }

@@ -24,8 +24,7 @@ pub(super) struct Places {
 impl Places {
     /// The places of a photo of `height` x `width`.
     pub(super) fn new(
-        source: Basis,
-        output: Basis,
+        [source, output]: [Basis; 2],
         drift: Drift,
         (height, width): (usize, usize),
     ) -> Self {
