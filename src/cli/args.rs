@@ -8,8 +8,9 @@ use clap::{Arg, ArgAction, ArgMatches, Command, ValueHint, value_parser};
 use crate::base::error::Result;
 use crate::base::params::{Param, Value as _};
 use crate::cli::sources::Sources;
-use crate::cli::{maps, palette, study};
+use crate::cli::{extract, maps, palette, study};
 use crate::image::material::MapKind;
+use crate::verb::extract::ExtractParams;
 use crate::verb::lattice::LatticeParams;
 use crate::verb::params::TileParams;
 use crate::verb::tile::MAX_VARIANTS;
@@ -58,6 +59,7 @@ pub(super) fn command() -> Command {
         .arg_required_else_help(true)
         .subcommand(tile())
         .subcommand(palette::command())
+        .subcommand(extract::command())
         .subcommand(apply())
         .subcommand(lattice())
         .subcommand(study::command())
@@ -65,7 +67,7 @@ pub(super) fn command() -> Command {
             Command::new("params")
                 .about("Lists the parameters of a command: meaning, default, range.")
                 .before_help("Examples:\n  texforge params tile\n  texforge params tile --json")
-                .arg(Arg::new("verb").value_name("COMMAND").value_parser(["tile"]).help("Only this command's"))
+                .arg(Arg::new("verb").value_name("COMMAND").value_parser([TileParams::VERB, ExtractParams::VERB]).help("This command's; tile if left out"))
                 .arg(json()),
         )
         .subcommand(
@@ -97,7 +99,7 @@ pub(super) fn command() -> Command {
                 .arg(
                     Arg::new("verb")
                         .value_name("COMMAND")
-                        .value_parser(["tile", "palette", "apply", "lattice", "study", "params", "info", "completions"])
+                        .value_parser(["tile", "palette", "extract", "apply", "lattice", "study", "params", "info", "completions"])
                         .help("The page of this command"),
                 ),
         )
@@ -287,7 +289,7 @@ pub(super) fn flag(param: Param) -> Arg {
         PossibleValuesParser::new(param.choices).into()
     };
     let value_name = match param.kind {
-        "size" => "WxH",
+        "size" | "period" => "WxH",
         "choice" => "WORD",
         _ => "N",
     };

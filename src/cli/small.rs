@@ -13,6 +13,7 @@ use crate::cli::work::{Session, supervise, watch_signals};
 use crate::cli::{args, files};
 use crate::image::material::MapKind;
 use crate::image::picture::{Encoding, Picture};
+use crate::verb::extract::ExtractParams;
 use crate::verb::params::TileParams;
 
 /// Version of what `--json` writes; goes up when a field changes its meaning or goes away.
@@ -20,7 +21,11 @@ pub(super) const SCHEMA_VERSION: u32 = 1;
 
 /// `texforge params`.
 pub(super) fn params(matches: &ArgMatches) -> Result<()> {
-    let schema = TileParams::schema();
+    let verb = matches.get_one::<String>("verb").map_or(TileParams::VERB, String::as_str);
+    let schema = match verb {
+        ExtractParams::VERB => ExtractParams::schema(),
+        _ => TileParams::schema(),
+    };
     if matches.get_flag("json") {
         let list: Vec<_> = schema
             .iter()
@@ -37,9 +42,9 @@ pub(super) fn params(matches: &ArgMatches) -> Result<()> {
                 })
             })
             .collect();
-        return print_json(&json!({ "schema_version": SCHEMA_VERSION, TileParams::VERB: list }));
+        return print_json(&json!({ "schema_version": SCHEMA_VERSION, verb: list }));
     }
-    let mut text = format!("texforge {}\n", TileParams::VERB);
+    let mut text = format!("texforge {verb}\n");
     for p in &schema {
         let accepts = if p.choices.is_empty() { p.range.clone() } else { p.choices.join(", ") };
         let facts = [accepts.as_str(), p.unit];

@@ -2,4 +2,5 @@
 
 pub mod flatten;
 pub mod make_seamless;
+pub mod representative;
 pub mod stationary;
