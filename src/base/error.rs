@@ -84,7 +84,9 @@ pub enum Error {
         reason: String,
     },
     /// A picture without the structure that is asked for; it may be used in another way.
-    #[error("the photo has no clear {what} (confidence {confidence:.2}, {least:.2} is needed); {remedy}")]
+    #[error(
+        "the photo has no clear {what} (confidence {confidence:.2}, {least:.2} is needed); {remedy}"
+    )]
     NoStructure {
         /// Which structure.
         what: String,

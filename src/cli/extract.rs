@@ -176,14 +176,14 @@ impl Request {
         }
         if !folder.exists() {
             // What could be made here could be made in it.
-            return files::check_place(&folder.with_file_name(".texforge.png"), &[], true).map_err(|error| {
-                match error {
+            return files::check_place(&folder.with_file_name(".texforge.png"), &[], true).map_err(
+                |error| match error {
                     Error::Io { action, source, .. } => {
                         Error::Io { action, path: folder.clone(), source }
                     }
                     error => error,
-                }
-            });
+                },
+            );
         }
         if !folder.is_dir() {
             return Err(Error::Exists { path: folder.clone() });
@@ -196,13 +196,16 @@ impl Request {
             let tile = photo.map(|photo| folder.join(name("tile", i, photo)));
             for (wanted, map) in self.maps.iter().zip(maps) {
                 let path = tile.as_ref().map(|tile| maps::output_path(tile, wanted.name, map));
-                names.extend(path.and_then(|p| Some(p.file_name()?.to_string_lossy().into_owned())));
+                names
+                    .extend(path.and_then(|p| Some(p.file_name()?.to_string_lossy().into_owned())));
             }
         }
         let mut inputs: Vec<&Path> = vec![&self.photo];
         inputs.extend(self.mask.iter().map(PathBuf::as_path));
         inputs.extend(self.maps.iter().flat_map(|m| &m.paths).map(PathBuf::as_path));
-        names.iter().try_for_each(|name| files::check_place(&folder.join(name), &inputs, self.force))
+        names
+            .iter()
+            .try_for_each(|name| files::check_place(&folder.join(name), &inputs, self.force))
     }
 }
 
@@ -252,13 +255,14 @@ fn write(
     maps: &[Picture],
 ) -> Result<Vec<Written>> {
     let mut all: Vec<(Written, Vec<u8>)> = Vec::new();
-    let mut add = |role, map: Option<&str>, name: &str, picture: &Picture, kind, record: Option<&str>| {
-        session.check()?;
-        let path = request.folder.join(name);
-        let bytes = files::encode(picture, Some(&path), kind, record)?;
-        all.push((Written::new(role, map, &path, picture.width(), picture.height()), bytes));
-        Ok::<_, Error>(())
-    };
+    let mut add =
+        |role, map: Option<&str>, name: &str, picture: &Picture, kind, record: Option<&str>| {
+            session.check()?;
+            let path = request.folder.join(name);
+            let bytes = files::encode(picture, Some(&path), kind, record)?;
+            all.push((Written::new(role, map, &path, picture.width(), picture.height()), bytes));
+            Ok::<_, Error>(())
+        };
     let mut of_maps = Vec::new();
     for (wanted, map) in request.maps.iter().zip(maps) {
         of_maps.push((wanted, made.tiles_of(map, wanted.kind)?));
@@ -312,7 +316,8 @@ fn record(made: &Extraction, i: usize) -> String {
 
 fn typed_params(report: &ExtractReport) -> serde_json::Value {
     let schema = ExtractParams::schema();
-    let value = |(param, (name, text)): (_, &(&str, String))| ((*name).to_owned(), typed(param, text));
+    let value =
+        |(param, (name, text)): (_, &(&str, String))| ((*name).to_owned(), typed(param, text));
     schema.iter().zip(&report.params).map(value).collect::<serde_json::Map<_, _>>().into()
 }
 

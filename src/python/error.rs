@@ -115,12 +115,9 @@ pub(super) fn example(kind: &str) -> Result<()> {
             remedy: what(),
         },
         ErrorKind::BadPicture => Error::BadPicture { what: what(), reason: what() },
-        ErrorKind::NoStructure => Error::NoStructure {
-            what: what(),
-            confidence: 0.1,
-            least: 0.5,
-            remedy: what(),
-        },
+        ErrorKind::NoStructure => {
+            Error::NoStructure { what: what(), confidence: 0.1, least: 0.5, remedy: what() }
+        }
         ErrorKind::Memory => Error::Memory { what: what(), need_mib: 2, available_mib: 1 },
         ErrorKind::Decode => Error::Decode { path: path(), reason: what() },
         ErrorKind::Format => Error::Format { path: path(), reason: what() },

@@ -48,7 +48,7 @@ const UPRIGHT: f64 = 0.1;
 /// Where the period comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum PeriodSource {
-    /// Of the two below, the one that finds the smaller rectangle with enough confidence.
+    /// The lattice's if that is sure enough, else that of the self-difference.
     Auto,
     /// The self-difference along the axes (the paper's).
     Ssd,
@@ -106,7 +106,7 @@ choice! {
 params! {
     /// Parameters of [`extract`].
     pub struct ExtractParams for "extract" {
-        /// The period: WIDTHxHEIGHT in pixels, which may be fractions; ssd looks for it along both axes, lattice takes the smallest upright rectangle of the lattice, auto tries both.
+        /// The period: WIDTHxHEIGHT in pixels, which may be fractions; ssd looks for it along both axes, lattice takes the smallest upright rectangle of the lattice, auto tries that first, then ssd.
         period: PeriodSource = PeriodSource::Auto, unit "px";
         /// How many periods a tile spans in each direction.
         periods: usize = 1, in 1..=64;
@@ -365,7 +365,10 @@ fn check(photo: &Picture, params: &ExtractParams) -> Result<()> {
     let (pixels, channels) = ((width * height) as u64, photo.channels() as u64);
     let work = pixels * (8 * channels + 100) + photo.byte_len() as u64 + 600 * pixels.min(1 << 20);
     let tiles = params.count as u64 * pixels / 4 * (12 + photo.byte_len() as u64 / pixels);
-    ensure_available(&format!("extracting tiles from a {width}x{height} photo"), work.checked_add(tiles))
+    ensure_available(
+        &format!("extracting tiles from a {width}x{height} photo"),
+        work.checked_add(tiles),
+    )
 }
 
 /// Where the photo may be used; `None` is everywhere.
@@ -429,32 +432,31 @@ fn find_period(
             reason: "all its usable pixels are alike, so there is nothing that could repeat".into(),
         });
     }
-    let mut guesses = Vec::new();
-    if params.period != PeriodSource::Lattice {
-        guesses.extend(along_axes(&pixels, size, mask));
-    }
-    if params.period == PeriodSource::Ssd {
-        ctx.step(lattice::STEPS)?;
-    } else {
-        guesses.extend(of_lattice(ctx, &pixels, size, mask)?);
-    }
     let least = f64::from(params.min_confidence);
     let sure = |guess: &FoundPeriod| guess.confidence.unwrap_or(0.0);
-    let best = guesses.iter().map(sure).fold(0.0, f64::max);
-    let area = |guess: &FoundPeriod| crate::signal::basis::area(guess.sides);
-    let found = guesses.into_iter().filter(|guess| sure(guess) >= least);
-    found.reduce(|a, b| if area(&b) < SMALLER * area(&a) { b } else { a }).ok_or_else(|| {
-        let what = "period along its axes".into();
-        let remedy = "give one as WIDTHxHEIGHT in pixels (--period), or make a tile of all of the photo \
-                      (texforge tile)"
+    let mut best = 0.0;
+    let ways: [(PeriodSource, Way<'_>); 2] = [
+        (PeriodSource::Lattice, &|| of_lattice(ctx, &pixels, size, mask)),
+        (PeriodSource::Ssd, &|| Ok(along_axes(&pixels, size, mask))),
+    ];
+    for (way, find) in ways {
+        if params.period == way || params.period == PeriodSource::Auto {
+            match find()? {
+                Some(guess) if sure(&guess) >= least => return Ok(guess),
+                guess => best = guess.map_or(best, |guess| sure(&guess).max(best)),
+            }
+        }
+    }
+    let what = "period along its axes".into();
+    let remedy =
+        "give one as WIDTHxHEIGHT in pixels (--period), or make a tile of all of the photo \
+                  (texforge tile)"
             .into();
-        Error::NoStructure { what, confidence: best, least, remedy }
-    })
+    Err(Error::NoStructure { what, confidence: best, least, remedy })
 }
 
-/// A lattice's rectangle is taken if it is not larger than this times that of the self-difference: it
-/// also knows how that leans.
-const SMALLER: f64 = 1.2;
+/// A way to find a period.
+type Way<'a> = &'a dyn Fn() -> Result<Option<FoundPeriod>>;
 
 /// By the self-difference along both axes.
 fn along_axes(
@@ -500,9 +502,10 @@ fn framed(
 ) -> Result<(Frame, (usize, usize))> {
     let sides = sides.map(|v| v.map(|v| v * params.periods as f64));
     let [w, h] = sides.map(|v| dot(v, v).sqrt());
-    let whole = |n: f64| match params.scale {
-        Scaling::Down => (n * (1.0 + MOST_ENLARGED)).floor().max(1.0) as usize,
-        Scaling::Off => n.round().max(1.0) as usize,
+    let whole = |n: f64| {
+        let enlarged = n.round() > n * (1.0 + MOST_ENLARGED);
+        let down = params.scale == Scaling::Down && enlarged;
+        (if down { n.floor() } else { n.round() }).max(1.0) as usize
     };
     let tile = (whole(h), whole(w));
     let as_it_is = |side: f64, whole: usize| side == whole as f64;
@@ -603,8 +606,7 @@ fn cut(
         let symmetries = &Symmetry::ALL[..1];
         let sizes = [size];
         ensure_available("the band", stationary::memory_bytes(&sizes, symmetries, tile))?;
-        let exemplar =
-            ctx.install(|| Exemplar::new(ctx, &photos, symmetries, &plan, false))?;
+        let exemplar = ctx.install(|| Exemplar::new(ctx, &photos, symmetries, &plan, false))?;
         ctx.begin(exemplar.work(&plan) * places.len() as u64);
         Some(exemplar)
     } else {

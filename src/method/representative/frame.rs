@@ -108,11 +108,7 @@ impl Frame {
     /// None that a valid picture can cause.
     pub fn read(&self, picture: &Picture, kind: MapKind) -> Result<Picture> {
         let same = (picture.height(), picture.width()) == self.photo;
-        let out = if same && self.is_plain() {
-            picture.clone()
-        } else {
-            self.resampled(picture)?
-        };
+        let out = if same && self.is_plain() { picture.clone() } else { self.resampled(picture)? };
         if kind.is_normal() { renormalize(out) } else { Ok(out) }
     }
 
@@ -184,9 +180,11 @@ impl Frame {
             let (first, last) = ((center - reach).ceil() as i64, (center + reach).floor() as i64);
             let weights = (first..=last).map(|i| (i, lanczos((i as f64 - center) / wide)));
             taps[k].clear();
-            taps[k].extend(weights.filter(|(_, weight)| *weight != 0.0).map(|(i, weight)| {
-                (i.clamp(0, n as i64 - 1) as usize, weight)
-            }));
+            taps[k].extend(
+                weights
+                    .filter(|(_, weight)| *weight != 0.0)
+                    .map(|(i, weight)| (i.clamp(0, n as i64 - 1) as usize, weight)),
+            );
             let sum: f64 = taps[k].iter().map(|(_, weight)| weight).sum();
             taps[k].iter_mut().for_each(|(_, weight)| *weight /= sum);
         }

@@ -136,11 +136,7 @@ impl Costs {
         ctx.step(1)?;
         let unlike = boxed(&|y, x| {
             let i = y * w + x;
-            if codes.is_usable(i) {
-                classes[y % th * tw + x % tw].cost(codes.pixels[i])
-            } else {
-                0
-            }
+            if codes.is_usable(i) { classes[y % th * tw + x % tw].cost(codes.pixels[i]) } else { 0 }
         });
         ctx.step(1)?;
         let mut seams = seams(codes, (rows, cols), tile);
@@ -389,7 +385,11 @@ mod tests {
     }
 
     /// By definition: h from the tile's pixels, SSDN from the tiling that is really built.
-    fn naive(codes: &Codes, (th, tw): (usize, usize), (ty, tx): (usize, usize)) -> Option<[u64; 2]> {
+    fn naive(
+        codes: &Codes,
+        (th, tw): (usize, usize),
+        (ty, tx): (usize, usize),
+    ) -> Option<[u64; 2]> {
         let (h, w) = (codes.height, codes.width);
         let tile = |y: usize, x: usize| codes.pixels[(ty + y) * w + tx + x];
         let apart = |a: [i16; 3], b: [i16; 3]| -> u64 {
@@ -401,7 +401,8 @@ mod tests {
         let mut seam = 0;
         (0..tw).for_each(|x| seam += apart(tile(th - 1, x), tile(0, x)));
         (0..th).for_each(|y| seam += apart(tile(y, tw - 1), tile(y, 0)));
-        let from = |i: usize, t: usize, n: usize| (i as i64 - t as i64).rem_euclid(n as i64) as usize;
+        let from =
+            |i: usize, t: usize, n: usize| (i as i64 - t as i64).rem_euclid(n as i64) as usize;
         let tiling: Vec<[i16; 3]> =
             (0..h * w).map(|i| tile(from(i / w, ty, th), from(i % w, tx, tw))).collect();
         let unlike = (0..h * w)
