@@ -14,7 +14,11 @@ const SLACK: f64 = 0.06;
 
 /// A shorter period is taken if it is this nearly as strong as the strongest. Multiples of a period
 /// are periods too, and often a little stronger.
-const SHORTER: f64 = 0.8;
+const SHORTER: f64 = 0.88;
+
+/// Differences count as this share of what unrelated pixels differ by, at least: where hardly anything
+/// differs, such as along the rows of a picture of nothing but rows, minima mean nothing.
+const FLOOR: f64 = 0.1;
 
 /// Strength at which the confidence is a half.
 const EVEN: f64 = 0.16;
@@ -31,7 +35,8 @@ pub struct Period {
 }
 
 /// The period of a picture from its self-difference: entry k is the mean squared difference between
-/// the picture and its copy moved by k pixels (`None`: not known). `None` if nothing repeats at all.
+/// the picture and its copy moved by k pixels (`None`: not known), and `unrelated` what unrelated
+/// pixels differ by. `None` if nothing repeats at all.
 ///
 /// A period has minima at all its multiples. The candidates are the minima up to half the picture;
 /// each is followed through its multiples, and is as strong as these are deep on average, compared
@@ -42,7 +47,7 @@ pub struct Period {
 /// # Paper
 /// Representative Tile Extraction, sec. 3, eq. 3. There the period is the last minimum's place over
 /// its number; here it is the least squares fit to all places.
-pub fn period(differences: &[Option<f64>]) -> Option<Period> {
+pub fn period(differences: &[Option<f64>], unrelated: f64) -> Option<Period> {
     let n = differences.len();
     let known = ((n as f64 * (1.0 - LEAST_OVERLAP)) as usize).min(n);
     let g: Vec<f64> = differences[..known].iter().map_while(|v| *v).collect();
@@ -51,14 +56,15 @@ pub fn period(differences: &[Option<f64>]) -> Option<Period> {
     // The first minimum itself may be missing, so the half of each is tried as well.
     let lengths = minima.map(|k| bottom_of(&g, k)).flat_map(|length| [length, length / 2.0]);
     let lengths = lengths.filter(|length| *length >= LEAST as f64);
-    let followed: Vec<(f64, Period)> = lengths.filter_map(|length| follow(&g, length)).collect();
+    let followed: Vec<(f64, Period)> =
+        lengths.filter_map(|length| follow(&g, length, FLOOR * unrelated)).collect();
     let strongest = followed.iter().map(|(strength, _)| *strength).fold(0.0, f64::max);
     let strong = followed.into_iter().filter(|(s, _)| *s > 0.0 && *s >= SHORTER * strongest);
     strong.map(|(_, period)| period).reduce(|a, b| if b.length < a.length { b } else { a })
 }
 
 /// Follows a length through its multiples: its strength, and the period that comes out.
-fn follow(g: &[f64], mut length: f64) -> Option<(f64, Period)> {
+fn follow(g: &[f64], mut length: f64, floor: f64) -> Option<(f64, Period)> {
     let (mut top, mut bottom) = (0.0, 0.0);
     let mut depths = Vec::new();
     for m in 1.. {
@@ -76,7 +82,7 @@ fn follow(g: &[f64], mut length: f64) -> Option<(f64, Period)> {
         };
         let window = &g[around(-0.5)..=around(0.5)];
         let mean = window.iter().sum::<f64>() / window.len() as f64;
-        let depth = if mean > 0.0 { (mean - g[at]) / mean } else { 0.0 };
+        let depth = if mean > 0.0 { (mean - g[at]) / mean.max(floor) } else { 0.0 };
         depths.push(depth);
         // A place that is no minimum says nothing of the length.
         if g[at] < g[at - 1] && g[at] <= g[at + 1] && depth > 0.0 {
@@ -158,7 +164,7 @@ mod tests {
 
     #[test]
     fn a_fractional_period_is_measured_over_all_minima() {
-        let found = period(&dips(400, 23.37, |_| 0.6)).expect("a period");
+        let found = period(&dips(400, 23.37, |_| 0.6), 1.0).expect("a period");
         assert!((found.length - 23.37).abs() < 0.02, "{found:?}");
         assert!(found.confidence > 0.9 && found.minima >= 11, "{found:?}");
     }
@@ -167,11 +173,11 @@ mod tests {
     fn harmonics_and_multiples_are_not_the_period() {
         // Every second minimum is much shallower: the period is two of them.
         let uneven = |m: usize| if m % 2 == 1 { 0.25 } else { 0.7 };
-        let found = period(&dips(400, 20.0, uneven)).expect("a period");
+        let found = period(&dips(400, 20.0, uneven), 1.0).expect("a period");
         assert!((found.length - 40.0).abs() < 0.1, "{found:?}");
         // A little shallower is one: noise.
         let even = |m: usize| if m % 2 == 1 { 0.6 } else { 0.66 };
-        let found = period(&dips(400, 20.0, even)).expect("a period");
+        let found = period(&dips(400, 20.0, even), 1.0).expect("a period");
         assert!((found.length - 20.0).abs() < 0.1, "{found:?}");
     }
 
@@ -179,7 +185,7 @@ mod tests {
     fn one_missing_minimum_does_not_matter() {
         for missing in 1..=6 {
             let depth = |m: usize| if m == missing { 0.0 } else { 0.6 };
-            let found = period(&dips(300, 31.3, depth)).expect("a period");
+            let found = period(&dips(300, 31.3, depth), 1.0).expect("a period");
             assert!((found.length - 31.3).abs() < 0.1, "{missing}: {found:?}");
         }
     }
@@ -187,10 +193,13 @@ mod tests {
     #[test]
     fn what_does_not_repeat_has_none_or_no_confidence() {
         let rising: Vec<_> = (0..200).map(|k| Some(f64::from(k))).collect();
-        assert_eq!(period(&rising), None);
-        assert_eq!(period(&[]), None);
-        assert_eq!(period(&[None, None]), None);
-        let found = period(&dips(400, 23.0, |_| 0.0));
+        assert_eq!(period(&rising, 100.0), None);
+        assert_eq!(period(&[], 1.0), None);
+        assert_eq!(period(&[None, None], 1.0), None);
+        let faint: Vec<_> =
+            dips(400, 23.0, |_| 0.6).into_iter().map(|v| v.map(|v| 0.01 * v)).collect();
+        assert!(period(&faint, 1.0).is_none_or(|p| p.confidence < 0.1), "hardly anything differs");
+        let found = period(&dips(400, 23.0, |_| 0.0), 1.0);
         assert!(found.is_none_or(|p| p.confidence < 0.1), "{found:?}");
     }
 

@@ -1,17 +1,17 @@
 //! [`extract`]: the representative tile of a near-periodic photo.
 
+mod params;
+mod period;
+
 use std::time::Instant;
 
-use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::analyze::lattice;
-use crate::analyze::period::{period, rectangle};
 use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
 use crate::base::memory::ensure_available;
-use crate::base::params::{Value, choice, params};
-use crate::image::color::ColorModel;
+use crate::base::params::Value as _;
 use crate::image::mask::Mask;
 use crate::image::material::MapKind;
 use crate::image::picture::Picture;
@@ -23,17 +23,16 @@ use crate::method::representative::{self, Codes, Costs, Frame, Place};
 use crate::method::stationary::{self, Exemplar, Kept, Periods};
 use crate::search::patchmatch::Wrap;
 use crate::signal::basis::{Basis, dot};
-use crate::signal::self_difference::self_difference;
 use crate::verb::params::TileParams;
+
+pub use params::{ExtractParams, PeriodSource, Scaling};
+use period::{colors, find_period, framed};
 
 /// Shortest side of a photo that can be looked at: two periods of a few pixels.
 const SMALLEST: usize = 16;
 
 /// Least period that can be asked for, in pixels.
 const LEAST_PERIOD: f64 = 2.0;
-
-/// By how much a photo is enlarged rather than made smaller by nearly a pixel a period: as a share.
-const MOST_ENLARGED: f64 = 0.005;
 
 /// Longest side of a cell of the contact sheet, in pixels.
 const SHOWN: usize = 384;
@@ -44,92 +43,6 @@ const LEAST_PATCH: usize = 5;
 
 /// Side of a lean that is no lean, in pixels over a tile.
 const UPRIGHT: f64 = 0.1;
-
-/// Where the period comes from.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum PeriodSource {
-    /// The lattice's if that is sure enough, else that of the self-difference.
-    Auto,
-    /// The self-difference along the axes (the paper's).
-    Ssd,
-    /// The smallest upright rectangle of the lattice that [`detect_lattice`](crate::detect_lattice)
-    /// finds.
-    Lattice,
-    /// Given, in pixels.
-    Pixels {
-        /// To the right.
-        width: f64,
-        /// Downwards.
-        height: f64,
-    },
-}
-
-impl Value for PeriodSource {
-    const KIND: &'static str = "period";
-
-    fn parse(text: &str) -> Option<Self> {
-        match text {
-            "auto" => Some(Self::Auto),
-            "ssd" => Some(Self::Ssd),
-            "lattice" => Some(Self::Lattice),
-            text => {
-                let (width, height) = text.split_once(['x', 'X'])?;
-                Some(Self::Pixels { width: width.parse().ok()?, height: height.parse().ok()? })
-            }
-        }
-    }
-
-    fn show(&self) -> String {
-        match self {
-            Self::Auto => "auto".into(),
-            Self::Ssd => "ssd".into(),
-            Self::Lattice => "lattice".into(),
-            Self::Pixels { width, height } => format!("{width}x{height}"),
-        }
-    }
-
-    fn expected() -> String {
-        "auto, ssd, lattice, or a period as WIDTHxHEIGHT in pixels, which may be fractions".into()
-    }
-}
-
-choice! {
-    /// Whether the photo is scaled so that its period is a whole number of pixels.
-    pub enum Scaling {
-        /// Down to the next whole number, and put upright if it leans.
-        Down = "down",
-        /// Not at all: the tile's sides are rounded, its pixels are the photo's own.
-        Off = "off",
-    }
-}
-
-params! {
-    /// Parameters of [`extract`].
-    pub struct ExtractParams for "extract" {
-        /// The period: WIDTHxHEIGHT in pixels, which may be fractions; ssd looks for it along both axes, lattice takes the smallest upright rectangle of the lattice, auto tries that first, then ssd.
-        period: PeriodSource = PeriodSource::Auto, unit "px";
-        /// How many periods a tile spans in each direction.
-        periods: usize = 1, in 1..=64;
-        /// Whether the photo is scaled down a little (and put upright) so that the period is a whole number of pixels; off rounds the tile's sides and leaves all pixels as they are.
-        scale: Scaling = Scaling::Down;
-        /// How many tiles, the best first.
-        count: usize = 4, in 1..=100;
-        /// Weight of continuity, of how well a tile's edges fit each other; none chooses it such that it counts as much as resemblance.
-        alpha: Option<f32> = None;
-        /// Weight of resemblance, of how much the tiling is like the photo.
-        beta: f32 = 1.0, in 0.0..=1000000.0;
-        /// Share of the positions that is looked at, those with the best fitting edges: the paper's p. 1 looks at all, and takes no longer.
-        keep: f32 = 1.0, in 0.0..=1.0;
-        /// How much two tiles may overlap, as a share of their area.
-        overlap: f32 = 0.25, in 0.0..=1.0;
-        /// From which confidence on a period counts as found.
-        min_confidence: f32 = 0.5, in 0.0..=1.0;
-        /// Reach of the light flattening, 0.02 or more: differences of light that are wider are taken out of the photo first; 0 switches it off.
-        flatten: f32 = 0.0, in 0.0..=1.0, unit "fraction of the photo's shorter side";
-        /// Make a border of this width anew inside each tile, out of the photo's other periods, so that it fits seamlessly; 0 leaves the tile as it is.
-        band: usize = 0, in 0..=8192, unit "px";
-    }
-}
 
 /// Where a photo's period was found.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -226,6 +139,9 @@ impl Extraction {
         if self.frame.is_plain() {
             return self.tiles.iter().map(|tile| tile.map.apply(map, kind)).collect();
         }
+        // One pixel is gathered: the rules are those of the source map.
+        let (width, height) = self.report.photo_size;
+        SourceMap::new((1, 1), (height, width), vec![[0, 0]])?.apply(map, kind)?;
         let read = self.frame.read(map, kind)?;
         self.tiles.iter().map(|tile| tile.map.apply(&read, kind)).collect()
     }
@@ -397,144 +313,6 @@ fn flattened(
     let flat = ctx.install(|| flatten::run(photo, mask, sigma))?;
     notes.push(flat.note(sigma));
     Ok(Some(flat.picture))
-}
-
-/// The colours that are compared.
-fn colors(picture: &Picture) -> Vec<[f32; 3]> {
-    let model = ColorModel::new(picture);
-    let mut colors = model.averaging_pixels(picture);
-    colors.par_chunks_mut(picture.width()).for_each(|row| model.space().convert_row(row));
-    colors
-}
-
-/// The period that was given, or that is found.
-fn find_period(
-    ctx: &Ctx,
-    photo: &Picture,
-    mask: Option<&Mask>,
-    params: &ExtractParams,
-) -> Result<FoundPeriod> {
-    if let PeriodSource::Pixels { width, height } = params.period {
-        ctx.step(lattice::STEPS)?;
-        return Ok(FoundPeriod {
-            sides: [[width, 0.0], [0.0, height]],
-            by: "given",
-            confidence: None,
-        });
-    }
-    let size = (photo.height(), photo.width());
-    let pixels = colors(photo);
-    let mut alike = (0..pixels.len()).filter(|&i| mask.is_none_or(|m| m.usable()[i]));
-    let first = alike.next();
-    if first.is_none_or(|first| alike.all(|i| pixels[i] == pixels[first])) {
-        return Err(Error::BadPicture {
-            what: "the photo".into(),
-            reason: "all its usable pixels are alike, so there is nothing that could repeat".into(),
-        });
-    }
-    let least = f64::from(params.min_confidence);
-    let sure = |guess: &FoundPeriod| guess.confidence.unwrap_or(0.0);
-    let mut best = 0.0;
-    let ways: [(PeriodSource, Way<'_>); 2] = [
-        (PeriodSource::Lattice, &|| of_lattice(ctx, &pixels, size, mask)),
-        (PeriodSource::Ssd, &|| Ok(along_axes(&pixels, size, mask))),
-    ];
-    for (way, find) in ways {
-        if params.period == way || params.period == PeriodSource::Auto {
-            match find()? {
-                Some(guess) if sure(&guess) >= least => return Ok(guess),
-                guess => best = guess.map_or(best, |guess| sure(&guess).max(best)),
-            }
-        }
-    }
-    let what = "period along its axes".into();
-    let remedy =
-        "give one as WIDTHxHEIGHT in pixels (--period), or make a tile of all of the photo \
-                  (texforge tile)"
-            .into();
-    Err(Error::NoStructure { what, confidence: best, least, remedy })
-}
-
-/// A way to find a period.
-type Way<'a> = &'a dyn Fn() -> Result<Option<FoundPeriod>>;
-
-/// By the self-difference along both axes.
-fn along_axes(
-    pixels: &[[f32; 3]],
-    (h, w): (usize, usize),
-    mask: Option<&Mask>,
-) -> Option<FoundPeriod> {
-    let usable = mask.map(Mask::usable);
-    let planes = lattice::normalized(pixels, (h, w), mask, (h, w));
-    let across = period(&self_difference(&planes, (h, w), usable).0)?;
-    let transposed = |i: usize| i % h * w + i / h;
-    let planes: Vec<Vec<f32>> =
-        planes.iter().map(|p| (0..h * w).map(|i| p[transposed(i)]).collect()).collect();
-    let flags: Option<Vec<bool>> = usable.map(|u| (0..h * w).map(|i| u[transposed(i)]).collect());
-    let down = period(&self_difference(&planes, (w, h), flags.as_deref()).0)?;
-    Some(FoundPeriod {
-        sides: [[across.length, 0.0], [0.0, down.length]],
-        by: "ssd",
-        confidence: Some(across.confidence.min(down.confidence)),
-    })
-}
-
-/// The smallest rectangle of the lattice.
-fn of_lattice(
-    ctx: &Ctx,
-    pixels: &[[f32; 3]],
-    size: (usize, usize),
-    mask: Option<&Mask>,
-) -> Result<Option<FoundPeriod>> {
-    let found = lattice::find(ctx, pixels, size, mask, 0.0, true)?;
-    let half = [size.1 as f64 / 2.0, size.0 as f64 / 2.0];
-    Ok(found.and_then(|found| {
-        let sides = rectangle(found.basis, half)?;
-        Some(FoundPeriod { sides, by: "lattice", confidence: Some(found.confidence) })
-    }))
-}
-
-/// How the photo is read, and the height and width of a tile in it.
-fn framed(
-    photo: (usize, usize),
-    sides: Basis,
-    params: &ExtractParams,
-) -> Result<(Frame, (usize, usize))> {
-    let sides = sides.map(|v| v.map(|v| v * params.periods as f64));
-    let [w, h] = sides.map(|v| dot(v, v).sqrt());
-    let whole = |n: f64| {
-        let enlarged = n.round() > n * (1.0 + MOST_ENLARGED);
-        let down = params.scale == Scaling::Down && enlarged;
-        (if down { n.floor() } else { n.round() }).max(1.0) as usize
-    };
-    let tile = (whole(h), whole(w));
-    let as_it_is = |side: f64, whole: usize| side == whole as f64;
-    let plain = as_it_is(sides[0][0], tile.1) && as_it_is(sides[1][1], tile.0);
-    let upright = sides[0][1] == 0.0 && sides[1][0] == 0.0;
-    let frame = if params.scale == Scaling::Off || (plain && upright) {
-        Frame::plain(photo)
-    } else {
-        Frame::new(photo, sides, tile)
-    };
-    let (height, width) = frame.size();
-    if tile.0 > height || tile.1 > width {
-        let expected = format!(
-            "fewer, so that a tile fits into the photo (one period is {:.1}x{:.1} pixels)",
-            w / params.periods as f64,
-            h / params.periods as f64
-        );
-        return Err(Error::parameter("periods", expected, params.periods));
-    }
-    if params.band > 0 {
-        let most = tile.0.min(tile.1).saturating_sub(1) / 2;
-        if params.band < LEAST_PATCH || params.band > most {
-            let (h, w) = tile;
-            let expected =
-                format!("0, or {LEAST_PATCH} to {most}, which leaves a middle of the {w}x{h} tile");
-            return Err(Error::parameter("band", expected, params.band));
-        }
-    }
-    Ok((frame, tile))
 }
 
 /// What was found and done, for people.
