@@ -1,8 +1,8 @@
 """Extracts the tile of every exemplar that repeats: `make extracts`.
 
-A row of a class's sheet shows the photograph, the best tile repeated over as much, and the same with a
-border made anew, all at full size, so that seams show. Prints how each period was found, what was refused,
-and how long it took; a class that does not repeat shows what is taken for a period.
+A row of a class's sheet shows the photograph, the best tile repeated over as much, and the same
+with a border made anew, all at full size, so that seams show. Prints how each period was found,
+what was refused, and how long it took; a class that does not repeat shows what is taken for a period.
 """
 
 from __future__ import annotations
@@ -44,7 +44,8 @@ def row(path: Path, out: Path, side: int, periods: int) -> list[contact.Cell]:
     print(label, flush=True)
     Image.fromarray(found.sheet).save(out / f"{path.stem}.png")
     seen = contact.shown(photo, photo.encoding)
-    cells: list[contact.Cell] = [(label, seen.crop((0, 0, *(min(side, n) for n in seen.size))))]
+    cropped = seen.crop((0, 0, min(side, seen.width), min(side, seen.height)))
+    cells: list[contact.Cell] = [(label, cropped)]
     cells.append((f"h {tile.continuity:.1f}, SSDN {tile.resemblance:.1f}", repeated(tile, side)))
     band = min(32, min(height, width) // 4)
     if band >= 5:

@@ -12,7 +12,12 @@ import numpy as np
 from texforge import _api, _arrays, _texforge
 from texforge._errors import ParameterError
 from texforge._progress import reporting
-from texforge._types import Encoding, ImageLike, Progress, Scaling
+from texforge._types import (  # noqa: TC001 (the signatures can be resolved at run time)
+    Encoding,
+    ImageLike,
+    Progress,
+    Scaling,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -75,7 +80,8 @@ class ExtractedTile:
                 self.scaled_size, self.place, self.image.shape, strict=False
             )
         )
-        return self.image[rows][:, columns]
+        tiling: npt.NDArray[Any] = self.image[rows][:, columns]
+        return tiling
 
     def tiled(self, rows: int = 3, columns: int = 3) -> npt.NDArray[Any]:
         """Return the image repeated `rows` times downwards and `columns` times to the right."""
@@ -103,8 +109,8 @@ class Extraction:
     tiles : list of ExtractedTile
         The tiles, the best first.
     period : ((float, float), (float, float))
-        The period of the photo: the displacements (rows, columns) of one period downwards and of one
-        to the right, in its pixels.
+        The period of the photo: the displacements (rows, columns) of one period downwards and of
+        one to the right, in its pixels.
     found_by : {"ssd", "lattice", "given"}
         How it was found.
     confidence : float or None
@@ -130,7 +136,7 @@ class Extraction:
     report: dict[str, Any]
 
     def save(self, folder: PathType, *, overwrite: bool = False) -> list[Path]:
-        """Write the tiles, their maps and tilings and the sheet, named as ``texforge extract`` does.
+        """Write the tiles, their maps and tilings and the sheet, named as by ``texforge extract``.
 
         Parameters
         ----------
@@ -209,8 +215,8 @@ def extract(
 ) -> Extraction:
     """Cut the tile out of a photo that repeats that stands best for all of it.
 
-    Cloth, bricks, windows: one period of the photo, which repeated is most like the photo, and whose
-    edges fit each other. All positions are tried.
+    Cloth, bricks, windows: one period of the photo, which repeated is most like the photo, and
+    whose edges fit each other. All positions are tried.
 
     Parameters
     ----------
@@ -219,13 +225,14 @@ def extract(
     period : {"auto", "ssd", "lattice"} or (float, float)
         **(height, width)** of the period in pixels, which may be fractions; or how it is found:
         ``"lattice"`` takes the smallest upright rectangle of what `detect_lattice` finds, ``"ssd"``
-        moves the photo along both axes over itself (the paper's way), ``"auto"`` does the first and,
-        if that is not sure enough, the second.
+        moves the photo along both axes over itself (the paper's way), ``"auto"`` does the first
+        and, if that is not sure enough, the second.
     periods : int
         How many periods a tile spans in each direction, 1 to 64.
     scale : {"down", "off"}
-        Whether the photo is scaled down a little, and put upright if it leans, so that the period is
-        a whole number of pixels. ``"off"`` rounds the tile's sides and copies the photo's pixels.
+        Whether the photo is scaled down a little, and put upright if it leans, so that the period
+        is a whole number of pixels, unless it nearly is. ``"off"`` rounds the tile's sides and
+        copies the photo's pixels.
     count : int
         How many tiles, 1 to 100; fewer come back if no more fit beside each other.
     alpha : float, optional
@@ -245,7 +252,8 @@ def extract(
         to 1, as for `tile`.
     band : int
         Width of a border inside each tile that is made anew out of the photo's other periods, in
-        pixels, 5 or more, at most 8192, so that the tile repeats without a seam; 0 leaves it as it is.
+        pixels, 5 or more, at most 8192, so that the tile repeats without a seam; 0 leaves it as
+        it is.
     seed : int
         Seed of the random choices of a band.
     mask : (H, W) array_like, or Pillow image, optional
@@ -281,7 +289,7 @@ def extract(
     -----
     The same arguments give the same bytes on every run, for any number of threads.
 
-    Source: "Representative Tile Extraction" (see the README).
+    Source: representative tile extraction from near-periodic textures, sec. 3 and 4.
 
     Examples
     --------

@@ -379,33 +379,45 @@ fn cut(
         coarse_iterations: 30,
         fine_iterations: 2,
     };
-    let exemplar = if band > 0 {
-        let photos = [(scaled, usable.as_ref())];
-        let symmetries = &Symmetry::ALL[..1];
-        let sizes = [size];
-        ensure_available("the band", stationary::memory_bytes(&sizes, symmetries, tile))?;
-        let exemplar = ctx.install(|| Exemplar::new(ctx, &photos, symmetries, &plan, false))?;
-        ctx.begin(exemplar.work(&plan) * places.len() as u64);
-        Some(exemplar)
-    } else {
-        None
+    let whole = |place: &Place| {
+        let yx = |i: usize| [(place.y + i / tw) as u32, (place.x + i % tw) as u32];
+        SourceMap::new(tile, size, (0..th * tw).map(yx).collect())
     };
-    let cut = |place: &Place| {
-        let map = match &exemplar {
-            None => {
-                let yx = |i: usize| [(place.y + i / tw) as u32, (place.x + i % tw) as u32];
-                SourceMap::new(tile, size, (0..th * tw).map(yx).collect())?
-            }
-            Some(exemplar) => {
-                let corner = (place.y, place.x);
-                let kept = Kept::cutout(size, corner, None, tile, band, wrap)?;
-                let plan = stationary::Plan { kept: Some(kept), ..plan.clone() };
-                ctx.install(|| stationary::run(ctx, exemplar, &plan, None))?
-            }
+    if band > 0 {
+        let need = stationary::memory_bytes(&[size], &Symmetry::ALL[..1], tile);
+        ensure_available("the band", need)?;
+    }
+    let banded = |i: usize, place: &Place| {
+        // The search holds that the first pixels of output and source are in phase, so the source
+        // begins whole tiles before the place.
+        let (top, left) = (place.y % th, place.x % tw);
+        let (h, w) = (size.0 - top, size.1 - left);
+        let from = |i: usize| [top + i / w, left + i % w];
+        let yx = (0..h * w).map(|i| from(i).map(|v| v as u32)).collect();
+        let piece = SourceMap::new((h, w), size, yx)?.apply(scaled, MapKind::Color)?;
+        let flag = |mask: &Mask| {
+            (0..h * w).map(|i| mask.usable()[from(i)[0] * size.1 + from(i)[1]]).collect()
         };
+        let mask = usable.as_ref().map(|mask| Mask::new(h, w, flag(mask))).transpose()?;
+        let corner = (place.y - top, place.x - left);
+        let kept = Kept::cutout((h, w), corner, None, tile, band, wrap)?;
+        let plan = stationary::Plan { kept: Some(kept), ..plan.clone() };
+        let map = ctx.install(|| {
+            let photos = [(&piece, mask.as_ref())];
+            let exemplar = Exemplar::new(ctx, &photos, &Symmetry::ALL[..1], &plan, false)?;
+            if i == 0 {
+                ctx.begin(exemplar.work(&plan) * places.len() as u64);
+            }
+            stationary::run(ctx, &exemplar, &plan, None)
+        })?;
+        let moved = map.positions().iter().map(|[y, x]| [y + top as u32, x + left as u32]);
+        SourceMap::new(tile, size, moved.collect())
+    };
+    let cut = |(i, place): (usize, &Place)| {
+        let map = if band > 0 { banded(i, place)? } else { whole(place)? };
         let picture = map.apply(scaled, MapKind::Color)?;
         let photo_place = frame.place([place.x as f64, place.y as f64]);
         Ok(ExtractedTile { picture, place: *place, photo_place, map })
     };
-    places.iter().map(cut).collect()
+    places.iter().enumerate().map(cut).collect()
 }

@@ -15,6 +15,9 @@ use crate::signal::self_difference::self_difference;
 use crate::verb::extract::params::{ExtractParams, PeriodSource, Scaling};
 use crate::verb::extract::{FoundPeriod, LEAST_PATCH};
 
+/// A period counts as whole if no pixel of the photo is moved by more than this if it is rounded.
+const UNMOVED: f64 = 0.5;
+
 /// By how much a photo is enlarged rather than made smaller by nearly a pixel a period: as a share.
 const MOST_ENLARGED: f64 = 0.005;
 
@@ -131,10 +134,15 @@ pub(super) fn framed(
         (if down { n.floor() } else { n.round() }).max(1.0) as usize
     };
     let tile = (whole(h), whole(w));
-    let as_it_is = |side: f64, whole: usize| side == whole as f64;
-    let plain = as_it_is(sides[0][0], tile.1) && as_it_is(sides[1][1], tile.0);
-    let upright = sides[0][1] == 0.0 && sides[1][0] == 0.0;
-    let frame = if params.scale == Scaling::Off || (plain && upright) {
+    // By how much the far end of the photo is moved if the sides are rounded and put upright.
+    let [across, down] = [photo.1 as f64 / w, photo.0 as f64 / h];
+    let rounded = [[tile.1 as f64, 0.0], [0.0, tile.0 as f64]];
+    let off = |k: usize| {
+        let [a, b] = [0, 1].map(|i: usize| (sides[i][k] - rounded[i][k]).abs());
+        a * across + b * down
+    };
+    let whole = off(0).max(off(1)) <= UNMOVED;
+    let frame = if params.scale == Scaling::Off || whole {
         Frame::plain(photo)
     } else {
         Frame::new(photo, sides, tile)
