@@ -14,7 +14,7 @@ GALLERY ?=
 QUALITY ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-rust test-python lint format gallery quality lattices readme-pictures bench bench-peers bench-record wheel ci clean
+.PHONY: help setup demo test test-rust test-python lint format gallery quality lattices extracts readme-pictures bench bench-peers bench-record wheel ci clean
 
 help: ## List the targets.
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-15s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -76,6 +76,9 @@ quality: setup ## Print costs, sharpness and verbatim blocks of tiles of EXEMPLA
 lattices: setup ## Print which lattices of EXEMPLARS are found and refused; draw them, in lattices/.
 	$(BIN)/python docs/lattices.py "$(EXEMPLARS)"
 
+extracts: setup ## Extract the tiles of EXEMPLARS that repeat; show them repeated, in extracts/.
+	$(BIN)/python docs/extracts.py "$(EXEMPLARS)"
+
 readme-pictures: setup ## Make the README's pictures anew, in docs/pictures/.
 	$(BIN)/python docs/readme_pictures.py
 
@@ -95,4 +98,4 @@ wheel: $(BIN)/.ready ## Build the wheel for distribution, in dist/.
 ci: lint test ## What CI runs.
 
 clean: ## Remove what was built.
-	rm -rf target $(VENV) demo gallery lattices dist
+	rm -rf target $(VENV) demo gallery lattices extracts dist

@@ -36,6 +36,11 @@ pub use image::rect::Rect;
 pub use image::sigma_map::SigmaMap;
 pub use image::sourcemap::{Origin, SourceMap};
 pub use image::symmetry::Symmetry;
+pub use method::representative::Place;
+pub use verb::extract::{
+    ExtractParams, ExtractReport, ExtractedTile, Extraction, FoundPeriod, PeriodSource, Scaling,
+    extract,
+};
 pub use verb::inputs::Inputs;
 pub use verb::lattice::{Lattice, LatticeParams, detect_lattice, lattice_autocorrelation};
 pub use verb::palette::{Palette, palette};

@@ -3,7 +3,8 @@
 `tile` makes a texture that repeats from a casual photo; the `Tile` it returns holds the picture
 and says which pixel of the photo each of its pixels is, so that other maps of the same material
 can follow (`apply`). `palette` shows how even it can become. `detect_lattice` finds by which
-displacements a photo of bricks, tiles or cloth repeats. `texture_cost` measures how much a texture
+displacements a photo of bricks, tiles or cloth repeats, `extract` cuts out the tile of such a photo
+that stands best for all of it. `texture_cost` measures how much a texture
 looks like its photo.
 `read_image` and `write_image` keep all the bits that files have. `study` compares the ways to
 tile over many photos.
@@ -25,6 +26,7 @@ from texforge._errors import (
     FormatError,
     InternalError,
     MissingFileError,
+    NoStructureError,
     OutOfMemory,
     OutputExistsError,
     ParameterError,
@@ -33,6 +35,7 @@ from texforge._errors import (
     SameFileError,
     TexforgeError,
 )
+from texforge._extract import ExtractedTile, Extraction, extract
 from texforge._lattice import detect_lattice
 from texforge._measure import texture_cost
 from texforge._palette import Palette, palette
@@ -53,6 +56,7 @@ from texforge._types import (
     Progress,
     ProgressBar,
     Quality,
+    Scaling,
     Snap,
     SourceMap,
     Step,
@@ -68,6 +72,8 @@ __all__ = [
     "Cancelled",
     "Costs",
     "Encoding",
+    "ExtractedTile",
+    "Extraction",
     "FileError",
     "Follow",
     "FormatError",
@@ -79,6 +85,7 @@ __all__ = [
     "Measure",
     "Method",
     "MissingFileError",
+    "NoStructureError",
     "OutOfMemory",
     "OutputExistsError",
     "Palette",
@@ -90,6 +97,7 @@ __all__ = [
     "Quality",
     "ReadError",
     "SameFileError",
+    "Scaling",
     "Snap",
     "SourceMap",
     "Step",
@@ -102,6 +110,7 @@ __all__ = [
     "__version__",
     "apply",
     "detect_lattice",
+    "extract",
     "load_source_map",
     "palette",
     "read_image",

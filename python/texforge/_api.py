@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import json
 from collections.abc import Mapping, Sequence  # noqa: TC003 (the signatures can be resolved at run time)
-from typing import Any, Literal, Unpack
+from typing import TYPE_CHECKING, Any, Literal, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -32,6 +32,9 @@ from texforge._types import (
     Tile,
     TileOptions,
 )
+
+if TYPE_CHECKING:
+    from texforge._extract import ExtractedTile
 
 __all__ = ["apply", "load_source_map", "read_image", "tile", "tile_variants", "write_image"]
 
@@ -301,7 +304,7 @@ def tiles(
         _arrays.picture(other, f"photo {i}", encoding) for i, other in enumerate(also or (), 2)
     ]
     texts = [
-        (param["name"], _text(param["name"], param["kind"], params[param["name"]]))
+        (param["name"], parameter_text(param["name"], param["kind"], params[param["name"]]))
         for param in _texforge.schema()
     ]
     if maps and params["method"] == "make-seamless":
@@ -310,7 +313,7 @@ def tiles(
             f"to apply to other maps, got {', '.join(map(repr, maps))}",
             fields={"name": "maps"},
         )
-    others = {name: _maps(other, name, len(further)) for name, other in (maps or {}).items()}
+    others = {name: maps_of(other, name, len(further)) for name, other in (maps or {}).items()}
     kinds = {name: _texforge.map_kind(name) for name in others}
     with reporting(progress) as callback:
         made, rest = _texforge.tiles(
@@ -343,7 +346,7 @@ def _tile(photo: _arrays.Picture, others: dict[str, list[_arrays.Picture]], part
     report["notes"] = [*report["notes"], *photo.notes]
     return Tile(
         image=photo.unpacked(picture_out),
-        source_map=None if map_out is None else _positions(map_out),
+        source_map=None if map_out is None else map_positions(map_out),
         costs=Costs(**report["costs"]),
         seed=report["seed"],
         params=_typed(dict(report["params"])),
@@ -527,7 +530,7 @@ def load_source_map(path: PathType) -> SourceMap:
     """
     parts = _texforge.read_source_map(path=_arrays.path(path))
     first, *further = parts[2]
-    return SourceMap(_positions(parts), first, tuple(further), _origins(parts))
+    return SourceMap(map_positions(parts), first, tuple(further), _origins(parts))
 
 
 def save_source_map(tile: Tile, path: PathType, *, overwrite: bool) -> None:
@@ -566,7 +569,7 @@ def save_tile(tile: Tile, path: PathType, *, overwrite: bool) -> None:
     )
 
 
-def preview_png(tile: Tile) -> bytes | None:
+def preview_png(tile: Tile | ExtractedTile) -> bytes | None:
     """Return the tile repeated two by two as an 8-bit PNG; None for data that is no picture."""
     image = _arrays.displayable(tile.image, tile.encoding)
     if image is None:
@@ -617,7 +620,7 @@ def _redone(redo: object, redo_of: Any, photo: _arrays.Picture) -> Any:
     return _arrays.packed_map(redo_of), [_arrays.integer("redo", side, 0, 2**31) for side in redo]
 
 
-def _maps(images: Any, name: object, further: int) -> list[_arrays.Picture]:
+def maps_of(images: Any, name: object, further: int) -> list[_arrays.Picture]:
     """Return a map of each photo; with one photo `images` is the map itself."""
     if not isinstance(name, str):
         raise ParameterError(
@@ -637,7 +640,7 @@ def _maps(images: Any, name: object, further: int) -> list[_arrays.Picture]:
     return [_arrays.picture(image, f"the map `{name}`", encoding) for image in images]
 
 
-def _positions(parts: Any) -> npt.NDArray[np.int32]:
+def map_positions(parts: Any) -> npt.NDArray[np.int32]:
     data, (height, width), _, _ = parts
     return np.frombuffer(data, dtype=np.int32).reshape(height, width, 2)
 
@@ -661,7 +664,7 @@ def _size_text(size: object) -> str:
     return f"{width}x{height}"
 
 
-def _text(name: str, kind: str, value: Any) -> str:
+def parameter_text(name: str, kind: str, value: Any) -> str:
     """Return a parameter as the text that the core reads."""
     if kind == "size":
         return _size_text(value)

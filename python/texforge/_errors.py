@@ -12,6 +12,7 @@ __all__ = [
     "FormatError",
     "InternalError",
     "MissingFileError",
+    "NoStructureError",
     "OutOfMemory",
     "OutputExistsError",
     "ParameterError",
@@ -68,6 +69,12 @@ class PictureError(TexforgeError, ValueError):
     """A picture, mask or map cannot be used as it is."""
 
     default_kind = "bad_picture"
+
+
+class NoStructureError(TexforgeError, ValueError):
+    """The picture lacks the structure that is asked for: it does not repeat, say."""
+
+    default_kind = "no_structure"
 
 
 class OutOfMemory(TexforgeError, MemoryError):
@@ -141,6 +148,7 @@ _CLASSES: dict[str, type[TexforgeError]] = {
     "not_finite": PictureError,
     "size_mismatch": PictureError,
     "bad_picture": PictureError,
+    "no_structure": NoStructureError,
     "memory": OutOfMemory,
     "decode": ReadError,
     "format": FormatError,

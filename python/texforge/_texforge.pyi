@@ -14,6 +14,9 @@ _Found = tuple[
 _Map = tuple[Any, _Size, list[_Size], Any]
 _MapOut = tuple[bytearray, _Size, list[_Size], bytearray | None]
 _Palette = tuple[list[float], list[tuple[float, float]], _PictureOut]
+_Extracted = tuple[
+    _PictureOut, _MapOut | None, tuple[int, int], list[float], tuple[float, float, float]
+]
 _TileOut = tuple[_PictureOut, _MapOut | None, list[tuple[str, _PictureOut]], str, list[_Step]]
 
 __all__ = [
@@ -23,6 +26,7 @@ __all__ = [
     "cli_study",
     "encode_png",
     "error_kinds",
+    "extract",
     "fail",
     "lattice",
     "lattice_overlay",
@@ -75,6 +79,16 @@ def lattice(
     threads: int,
     progress: Callable[[float], object] | None,
 ) -> _Found: ...
+def extract(
+    *,
+    photo: _Picture,
+    mask: _Picture | None,
+    maps: list[tuple[str, list[_Picture], str]],
+    params: list[tuple[str, str]],
+    seed: int,
+    threads: int,
+    progress: Callable[[float], object] | None,
+) -> tuple[list[_Extracted], list[tuple[str, list[_PictureOut]]], _PictureOut, str]: ...
 def lattice_overlay(*, picture: _Picture, v1: _Vector, v2: _Vector) -> _PictureOut: ...
 def lattice_snap(
     *, v1: _Vector, v2: _Vector, width: int, height: int

@@ -28,6 +28,7 @@ __all__ = [
     "Progress",
     "ProgressBar",
     "Quality",
+    "Scaling",
     "Snap",
     "SourceMap",
     "Step",
@@ -54,6 +55,8 @@ Symmetries: TypeAlias = Literal["none"] | Literal["mirror"] | Literal["rotate"] 
 """In which symmetries the photo's patches are used."""
 Follow: TypeAlias = Literal["off"] | Literal["auto"]
 """Whether a tile follows the photo's lattice."""
+Scaling: TypeAlias = Literal["down"] | Literal["off"]
+"""Whether a photo is scaled so that its period is a whole number of pixels."""
 Encoding: TypeAlias = Literal["srgb"] | Literal["linear"] | Literal["data"]
 """What the numbers of a picture mean."""
 MapKind: TypeAlias = (

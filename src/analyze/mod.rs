@@ -3,5 +3,6 @@
 pub mod appearance;
 pub mod lattice;
 pub mod nearest;
+pub mod period;
 pub mod stationarity;
 pub mod texture;

@@ -83,6 +83,20 @@ pub enum Error {
         /// What is wrong with it and what to do.
         reason: String,
     },
+    /// A picture without the structure that is asked for; it may be used in another way.
+    #[error(
+        "the photo has no clear {what} (confidence {confidence:.2}, {least:.2} is needed); {remedy}"
+    )]
+    NoStructure {
+        /// Which structure.
+        what: String,
+        /// How sure it is that there is one, in 0..=1.
+        confidence: f64,
+        /// The confidence that is needed.
+        least: f64,
+        /// What the user can do about it.
+        remedy: String,
+    },
     /// The work would not fit into memory; nothing was allocated.
     #[error(
         "{what} needs about {need_mib} MiB of memory, {available_mib} MiB are available; \
@@ -161,6 +175,8 @@ pub enum ErrorKind {
     SizeMismatch,
     /// See [`Error::BadPicture`].
     BadPicture,
+    /// See [`Error::NoStructure`].
+    NoStructure,
     /// See [`Error::Memory`].
     Memory,
     /// See [`Error::Decode`].
@@ -181,13 +197,14 @@ pub enum ErrorKind {
 
 impl ErrorKind {
     /// Every kind, in declaration order.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 15] = [
         Self::Parameter,
         Self::TooSmall,
         Self::EmptyMask,
         Self::NotFinite,
         Self::SizeMismatch,
         Self::BadPicture,
+        Self::NoStructure,
         Self::Memory,
         Self::Decode,
         Self::Format,
@@ -207,6 +224,7 @@ impl ErrorKind {
             Self::NotFinite => "not_finite",
             Self::SizeMismatch => "size_mismatch",
             Self::BadPicture => "bad_picture",
+            Self::NoStructure => "no_structure",
             Self::Memory => "memory",
             Self::Decode => "decode",
             Self::Format => "format",
@@ -229,6 +247,7 @@ impl Error {
             Self::NotFinite { .. } => ErrorKind::NotFinite,
             Self::SizeMismatch { .. } => ErrorKind::SizeMismatch,
             Self::BadPicture { .. } => ErrorKind::BadPicture,
+            Self::NoStructure { .. } => ErrorKind::NoStructure,
             Self::Memory { .. } => ErrorKind::Memory,
             Self::Decode { .. } => ErrorKind::Decode,
             Self::Format { .. } => ErrorKind::Format,

@@ -8,7 +8,7 @@ use clap::{Arg, ArgAction, ArgMatches, Command, ValueHint, value_parser};
 use crate::base::params::{Param, Value as _};
 use crate::cli::small::SCHEMAS;
 use crate::cli::sources::Sources;
-use crate::cli::{maps, palette, study};
+use crate::cli::{extract, maps, palette, study};
 use crate::image::material::MapKind;
 use crate::verb::lattice::LatticeParams;
 use crate::verb::params::TileParams;
@@ -58,6 +58,7 @@ pub(super) fn command() -> Command {
         .arg_required_else_help(true)
         .subcommand(tile())
         .subcommand(palette::command())
+        .subcommand(extract::command())
         .subcommand(apply())
         .subcommand(lattice())
         .subcommand(study::command())
@@ -102,7 +103,7 @@ pub(super) fn command() -> Command {
                 .arg(
                     Arg::new("verb")
                         .value_name("COMMAND")
-                        .value_parser(["tile", "palette", "apply", "lattice", "study", "params", "info", "completions"])
+                        .value_parser(["tile", "palette", "extract", "apply", "lattice", "study", "params", "info", "completions"])
                         .help("The page of this command"),
                 ),
         )
@@ -292,7 +293,7 @@ pub(super) fn flag(param: Param) -> Arg {
         PossibleValuesParser::new(param.choices).into()
     };
     let value_name = match param.kind {
-        "size" => "WxH",
+        "size" | "period" => "WxH",
         "choice" => "WORD",
         _ => "N",
     };

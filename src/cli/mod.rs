@@ -6,6 +6,7 @@
 mod apply;
 mod args;
 mod exit;
+mod extract;
 mod files;
 mod lattice;
 mod maps;
@@ -41,6 +42,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
     let result = match command {
         "tile" => tile::run(matches),
         "palette" => palette::run(matches),
+        "extract" => extract::run(matches),
         "apply" => apply::run(matches),
         "lattice" => lattice::run(matches),
         "params" => small::params(matches),

@@ -13,6 +13,7 @@ use crate::cli::work::{Session, supervise, watch_signals};
 use crate::cli::{args, files};
 use crate::image::material::MapKind;
 use crate::image::picture::{Encoding, Picture};
+use crate::verb::extract::ExtractParams;
 use crate::verb::lattice::LatticeParams;
 use crate::verb::params::TileParams;
 
@@ -24,7 +25,11 @@ type Schema = (&'static str, fn() -> Vec<Param>);
 
 /// The commands that have parameters of their own.
 pub(super) const SCHEMAS: &[Schema] =
-    &[(TileParams::VERB, TileParams::schema), (LatticeParams::VERB, LatticeParams::schema)];
+    &[
+    (TileParams::VERB, TileParams::schema),
+    (LatticeParams::VERB, LatticeParams::schema),
+    (ExtractParams::VERB, ExtractParams::schema),
+];
 
 /// `texforge params`.
 pub(super) fn params(matches: &ArgMatches) -> Result<()> {

@@ -107,6 +107,40 @@ pub fn row(cells: &[Cell]) -> Result<Picture> {
     Picture::new(height, width, c, Samples::U8(out), first.encoding)
 }
 
+/// Pictures in rows and columns on white, each column as wide as its widest picture, each row as high
+/// as its highest.
+///
+/// # Errors
+/// [`Error::BadPicture`](crate::Error::BadPicture) unless there is a picture and all are 8-bit ones
+/// of one number of channels.
+pub fn grid(rows: &[Vec<Picture>]) -> Result<Picture> {
+    let bad = |reason: &str| Error::BadPicture { what: "cell".into(), reason: reason.into() };
+    let all = || rows.iter().flatten();
+    let first = all().next().ok_or_else(|| bad("a sheet needs one"))?;
+    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
+    let widest = |i: usize| rows.iter().filter_map(|r| r.get(i)).map(Picture::width).max();
+    let widths: Vec<usize> = (0..columns).map(|i| widest(i).unwrap_or(0)).collect();
+    let heights: Vec<usize> =
+        rows.iter().map(|r| r.iter().map(Picture::height).max().unwrap_or(0)).collect();
+    let length = |sides: &[usize]| sides.iter().map(|side| side + GAP).sum::<usize>() + GAP;
+    let (height, width, c) = (length(&heights), length(&widths), first.channels());
+    let mut out = vec![u8::MAX; height * width * c];
+    for (i, row) in rows.iter().enumerate() {
+        for (j, picture) in row.iter().enumerate() {
+            picture.ensure_like(first, "a cell")?;
+            let Samples::U8(samples) = picture.samples() else {
+                return Err(bad("a sheet is made of 8-bit pictures"));
+            };
+            let (top, left) = (length(&heights[..i]), length(&widths[..j]));
+            let line = picture.width() * c;
+            for (y, from) in samples.chunks_exact(line).enumerate() {
+                out[((top + y) * width + left) * c..][..line].copy_from_slice(from);
+            }
+        }
+    }
+    Picture::new(height, width, c, Samples::U8(out), first.encoding)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -144,5 +178,20 @@ mod tests {
         let bar = |x: usize| at(2 + 2 * GAP, x);
         let second = 2 * GAP + 4;
         assert_eq!([bar(GAP), bar(second), bar(second + 1), bar(second + 2)], [224, 0, 0, 224]);
+    }
+
+    #[test]
+    fn a_grid_has_room_for_the_largest_of_each_row_and_column() {
+        let cell = |h: usize, w: usize, v: u8| {
+            Picture::new(h, w, 1, Samples::U8(vec![v; h * w]), Encoding::Srgb).expect("cell")
+        };
+        let rows = [vec![cell(2, 3, 1), cell(4, 1, 2)], vec![cell(1, 5, 3)]];
+        let sheet = grid(&rows).expect("sheet");
+        assert_eq!((sheet.height(), sheet.width()), (4 + 1 + 3 * GAP, 5 + 1 + 3 * GAP));
+        let Samples::U8(v) = sheet.samples() else { panic!("8 bits") };
+        let at = |y: usize, x: usize| v[y * sheet.width() + x];
+        assert_eq!([at(GAP, GAP), at(GAP + 2, GAP), at(GAP, GAP + 3)], [1, 255, 255]);
+        assert_eq!([at(GAP + 3, 2 * GAP + 5), at(2 * GAP + 4, GAP + 4)], [2, 3]);
+        assert!(grid(&[]).is_err());
     }
 }

@@ -13,6 +13,21 @@ use crate::with_samples;
 /// Most that light is raised or lowered. Deeper shadows hold little but noise.
 const LIMIT: f64 = 8.0;
 
+/// Least radius: what is smaller than this share of the photo is texture.
+const LEAST: f32 = 0.02;
+
+/// Fails unless the reach, a share of the photo's shorter side, is 0 (off) or that of light.
+///
+/// # Errors
+/// [`Error::Parameter`].
+pub fn check_reach(reach: f32) -> Result<()> {
+    if reach > 0.0 && reach < LEAST {
+        let expected = format!("0 (off) or {LEAST} to 1; less is texture, not light");
+        return Err(Error::parameter("flatten", expected, reach));
+    }
+    Ok(())
+}
+
 /// A flattened photo and what was done to it.
 #[derive(Debug)]
 pub struct Flat {
@@ -22,6 +37,18 @@ pub struct Flat {
     pub factors: (f64, f64),
     /// Share of the usable pixels' samples that were cut off at full scale (integers only).
     pub clipped: f64,
+}
+
+impl Flat {
+    /// What was done with a window of `sigma` pixels, for people.
+    pub fn note(&self, sigma: f64) -> String {
+        let (low, high) = self.factors;
+        format!(
+            "light flattened over {sigma:.0} pixels: multiplied by {low:.2} to {high:.2}, {:.1} % of the \
+             samples cut off at full scale",
+            self.clipped * 100.0
+        )
+    }
 }
 
 /// Divides `photo` by its low frequencies (Gaussian window of standard deviation `sigma` pixels),

@@ -2,5 +2,6 @@
 
 pub mod flatten;
 pub mod make_seamless;
+pub mod representative;
 pub mod rsgf;
 pub mod stationary;

@@ -53,6 +53,11 @@ fn fields<'py>(py: Python<'py>, error: &Error) -> PyResult<Bound<'py, PyDict>> {
             dict.set_item("expected", (want_h, want_w))?;
         }
         Error::BadPicture { what, .. } => dict.set_item("what", what)?,
+        Error::NoStructure { what, confidence, least, .. } => {
+            dict.set_item("what", what)?;
+            dict.set_item("confidence", confidence)?;
+            dict.set_item("least", least)?;
+        }
         Error::Memory { what, need_mib, available_mib } => {
             dict.set_item("what", what)?;
             dict.set_item("need_mib", need_mib)?;
@@ -110,6 +115,9 @@ pub(super) fn example(kind: &str) -> Result<()> {
             remedy: what(),
         },
         ErrorKind::BadPicture => Error::BadPicture { what: what(), reason: what() },
+        ErrorKind::NoStructure => {
+            Error::NoStructure { what: what(), confidence: 0.1, least: 0.5, remedy: what() }
+        }
         ErrorKind::Memory => Error::Memory { what: what(), need_mib: 2, available_mib: 1 },
         ErrorKind::Decode => Error::Decode { path: path(), reason: what() },
         ErrorKind::Format => Error::Format { path: path(), reason: what() },

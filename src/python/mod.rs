@@ -8,6 +8,7 @@
 mod array;
 mod enter;
 mod error;
+mod extract;
 
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -26,6 +27,7 @@ use crate::image::overlay;
 use crate::image::picture::Picture;
 use crate::image::rect::Rect;
 use crate::image::sigma_map::SigmaMap;
+use crate::verb::extract::ExtractParams;
 use crate::verb::inputs::Inputs;
 use crate::verb::lattice::{Lattice, LatticeParams, detect_lattice, lattice_autocorrelation};
 use crate::verb::params::TileParams;
@@ -337,7 +339,7 @@ fn map_kind(name: &str) -> String {
     material::classify(name).map_or(MapKind::Data, |(_, kind)| kind).show()
 }
 
-/// Every parameter of a Python function (`texture_cost`, `detect_lattice`, else `tile`), with its default as text.
+/// Every parameter of a Python function (`texture_cost`, `detect_lattice`, `extract`, else `tile`), with its default as text.
 #[pyfunction]
 #[pyo3(signature = (verb = "tile"))]
 fn schema<'py>(py: Python<'py>, verb: &str) -> PyResult<Vec<Bound<'py, PyDict>>> {
@@ -355,6 +357,7 @@ fn schema<'py>(py: Python<'py>, verb: &str) -> PyResult<Vec<Bound<'py, PyDict>>>
     let params = match verb {
         TextureCostParams::VERB => TextureCostParams::schema(),
         "detect_lattice" => LatticeParams::schema(),
+        ExtractParams::VERB => ExtractParams::schema(),
         _ => TileParams::schema(),
     };
     params.into_iter().map(entry).collect()
@@ -403,6 +406,8 @@ fn cli_study(py: Python<'_>, args: Vec<OsString>) -> PyResult<(u8, Option<Bound<
 /// The private module.
 #[pymodule(gil_used = false)]
 mod _texforge {
+    #[pymodule_export]
+    use super::extract::extract;
     #[pymodule_export]
     use super::{
         apply, cli_main, cli_study, encode_png, error_kinds, fail, lattice, lattice_overlay,

@@ -7,5 +7,6 @@ pub mod localhist;
 pub mod lowpass;
 pub mod measure;
 pub mod resample;
+pub mod self_difference;
 pub mod steerable;
 pub mod window;

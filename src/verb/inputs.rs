@@ -6,7 +6,7 @@ use crate::image::material::MapKind;
 use crate::image::picture::Picture;
 use crate::image::sigma_map::SigmaMap;
 use crate::image::sourcemap::{Origin, SourceMap};
-use crate::method::flatten::{self, Flat};
+use crate::method::flatten;
 use crate::verb::params::TileParams;
 use crate::verb::redo::Redo;
 
@@ -90,14 +90,9 @@ impl<'a> Inputs<'a> {
         }
         let flat = |(photo, mask): (&Picture, &Option<Mask>)| {
             let sigma = f64::from(params.flatten) * photo.height().min(photo.width()) as f64;
-            let Flat { picture, factors: (low, high), clipped } =
-                flatten::run(photo, mask.as_ref(), sigma)?;
-            notes.push(format!(
-                "light flattened over {sigma:.0} pixels: multiplied by {low:.2} to {high:.2}, {:.1} % \
-                 of the samples cut off at full scale",
-                clipped * 100.0
-            ));
-            Ok(picture)
+            let flat = flatten::run(photo, mask.as_ref(), sigma)?;
+            notes.push(flat.note(sigma));
+            Ok(flat.picture)
         };
         self.photos(None).into_iter().zip(masks).map(flat).collect::<Result<Vec<_>>>().map(Some)
     }

@@ -13,8 +13,8 @@ use crate::image::material::MapKind;
 use crate::image::picture::Picture;
 use crate::image::sigma_map::SigmaMap;
 use crate::image::sourcemap::SourceMap;
-use crate::method::make_seamless;
 use crate::method::stationary::{self, Dial, Evenness, Exemplar, Kept, Periods};
+use crate::method::{flatten, make_seamless};
 use crate::search::patchmatch::Wrap;
 use crate::signal::measure::Statistic;
 use crate::signal::window::Domain;
@@ -25,9 +25,6 @@ use crate::verb::tile::{Costs, MAX_VARIANTS, Report, Step, Tile};
 
 /// Longest side of a tile, in pixels.
 const MAX_TILE_SIDE: usize = 32_768;
-
-/// Least radius of the flattening: what is smaller than this share of the photo is texture.
-const LEAST_FLATTEN: f32 = 0.02;
 
 /// Photos that were checked and analysed, ready for tiles of any seed and sigma.
 #[derive(Debug)]
@@ -218,10 +215,7 @@ fn check(inputs: &Inputs<'_>, params: &TileParams, count: usize) -> Result<(usiz
         let expected = "1 with the method make-seamless, which makes no random choices";
         return Err(Error::parameter("variants", expected, count));
     }
-    if params.flatten > 0.0 && params.flatten < LEAST_FLATTEN {
-        let expected = format!("0 (off) or {LEAST_FLATTEN} to 1; less is texture, not light");
-        return Err(Error::parameter("flatten", expected, params.flatten));
-    }
+    flatten::check_reach(params.flatten)?;
     if params.patch.is_multiple_of(2) {
         return Err(Error::parameter("patch", "odd, so that a patch has a middle", params.patch));
     }

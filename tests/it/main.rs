@@ -3,6 +3,7 @@
 mod band;
 mod cli;
 mod costs;
+mod extract;
 mod golden;
 mod house;
 mod io;

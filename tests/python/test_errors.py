@@ -22,6 +22,7 @@ CLASSES: dict[str, tuple[type[texforge.TexforgeError], type[Exception]]] = {
     "not_finite": (texforge.PictureError, ValueError),
     "size_mismatch": (texforge.PictureError, ValueError),
     "bad_picture": (texforge.PictureError, ValueError),
+    "no_structure": (texforge.NoStructureError, ValueError),
     "memory": (texforge.OutOfMemory, MemoryError),
     "decode": (texforge.ReadError, OSError),
     "format": (texforge.FormatError, OSError),

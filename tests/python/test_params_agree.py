@@ -12,7 +12,7 @@ from texforge import _texforge
 
 
 @pytest.mark.parametrize(
-    "function", [texforge.tile, texforge.texture_cost, texforge.detect_lattice]
+    "function", [texforge.tile, texforge.texture_cost, texforge.detect_lattice, texforge.extract]
 )
 def test_names_order_and_defaults_are_those_of_the_core(function: Callable[..., object]) -> None:
     signature = inspect.signature(function)
@@ -44,6 +44,7 @@ def test_everything_but_the_picture_is_keyword_only() -> None:
         texforge.tile,
         texforge.apply,
         texforge.detect_lattice,
+        texforge.extract,
         texforge.read_image,
         texforge.write_image,
     ):
@@ -53,7 +54,7 @@ def test_everything_but_the_picture_is_keyword_only() -> None:
 
 
 @pytest.mark.parametrize(
-    "function", [texforge.tile, texforge.texture_cost, texforge.detect_lattice]
+    "function", [texforge.tile, texforge.texture_cost, texforge.detect_lattice, texforge.extract]
 )
 def test_every_parameter_is_documented(function: Callable[..., object]) -> None:
     doc = inspect.getdoc(function)
@@ -63,7 +64,7 @@ def test_every_parameter_is_documented(function: Callable[..., object]) -> None:
 
 
 @pytest.mark.parametrize(
-    "function", [texforge.tile, texforge.texture_cost, texforge.detect_lattice]
+    "function", [texforge.tile, texforge.texture_cost, texforge.detect_lattice, texforge.extract]
 )
 def test_ranges_in_the_docs_are_those_of_the_core(function: Callable[..., object]) -> None:
     doc = " ".join((inspect.getdoc(function) or "").split())

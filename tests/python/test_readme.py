@@ -69,6 +69,10 @@ def test_the_commands_run_as_they_stand(tmp_path: Path) -> None:
             outputs = ["several-1.png", "several-2.png", "several-3.png"]
         if "palette" in command:
             outputs = ["choice-1.png", "choice-4.png", "choice.palette.png"]
+        if "extract" in command:
+            outputs = [
+                f"{outputs[0]}/{name}" for name in ("tile_01.png", "tiling_01.png", "sheet.png")
+            ]
         assert all((tmp_path / output).is_file() for output in outputs), command
 
 

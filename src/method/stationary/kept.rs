@@ -58,8 +58,27 @@ impl Kept {
         band: usize,
         wrap: Wrap,
     ) -> Result<Self> {
+        let corner = ((photo.0 - size.0) / 2, (photo.1 - size.1) / 2);
+        Self::cutout(photo, corner, usable, size, band, wrap)
+    }
+
+    /// The same of the piece of the photo whose upper left pixel is `corner` (row, column).
+    ///
+    /// # Errors
+    /// As [`Kept::middle`].
+    ///
+    /// # Panics
+    /// If the piece reaches out of the photo.
+    pub fn cutout(
+        photo: (usize, usize),
+        (top, left): (usize, usize),
+        usable: Option<&[bool]>,
+        size: (usize, usize),
+        band: usize,
+        wrap: Wrap,
+    ) -> Result<Self> {
         let (h, w) = size;
-        let (top, left) = ((photo.0 - h) / 2, (photo.1 - w) / 2);
+        assert!(top + h <= photo.0 && left + w <= photo.1, "a piece outside of the photo");
         let within = |i: usize, n: usize, wraps: bool| !wraps || (band..n - band).contains(&i);
         let from = |i: usize| [(top + i / w) as u32, (left + i % w) as u32];
         let kept = |i: usize| {

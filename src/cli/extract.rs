@@ -1,0 +1,382 @@
+//! `texforge extract`.
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+use clap::builder::ValueParser;
+use clap::{Arg, ArgAction, ArgMatches, Command};
+use serde::Serialize;
+use serde_json::json;
+
+use crate::base::ctx::Ctx;
+use crate::base::error::{Error, Result};
+use crate::cli::maps::{self, Wanted};
+use crate::cli::show::duration;
+use crate::cli::small::{SCHEMA_VERSION, print_json, typed};
+use crate::cli::sources::Sources;
+use crate::cli::summary::Written;
+use crate::cli::work::{Session, supervise};
+use crate::cli::{args, files};
+use crate::image::mask::Mask;
+use crate::image::material::MapKind;
+use crate::image::picture::Picture;
+use crate::verb::extract::{ExtractParams, ExtractReport, Extraction, extract};
+use crate::verb::inputs::Inputs;
+use crate::verb::params::TileParams;
+
+const EXAMPLES: &str = "\
+Examples:
+  texforge extract cloth.jpg -o cloth_tiles
+  texforge extract cloth.jpg -o cloth_tiles --count 8 --periods 2
+  texforge extract facade.jpg -o facade_tiles --period 537x638
+  texforge extract facade.jpg -o facade_tiles --flatten 0.3 --band 24
+  texforge extract scan.png -o tiles --mask usable.png --map normal=scan_nrm.png
+  texforge extract cloth.jpg -o tiles --scale off --save-source-maps";
+
+/// The command as it is typed.
+pub(super) fn command() -> Command {
+    Command::new(ExtractParams::VERB)
+        .about("Cuts the tile out of a photo that repeats (cloth, bricks, windows) that stands best for all of it.")
+        .before_help(EXAMPLES)
+        .arg(Sources::photo())
+        .arg(
+            args::file("output", "DIR", "The folder to write to, made if it is not there: tile_01.png (the best), \
+                 tiling_01.png and so on, and sheet.png, which shows all; pictures of floats are EXR")
+                .short('o')
+                .long("output")
+                .required(true),
+        )
+        .args(ExtractParams::schema().into_iter().map(args::flag))
+        .next_help_heading("Inputs")
+        .arg(
+            args::file("mask", "FILE", "Picture of the photo's size: usable is where its first channel is at least half of \
+                 full scale and its alpha, if any, too; the photo's own transparent pixels are never used")
+                .long("mask"),
+        )
+        .arg(
+            Arg::new("map")
+                .long("map")
+                .value_name("NAME=FILE")
+                .action(ArgAction::Append)
+                .value_parser(ValueParser::os_string())
+                .help(format!(
+                    "A further map of the same surface, cut at the same places (tile_01_NAME.png); may be repeated. \
+                     NAME is one of {}",
+                    maps::known_names()
+                )),
+        )
+        .next_help_heading("Outputs")
+        .arg(args::switch("save-source-maps", "Also write which photo pixel each tile pixel is (tile_01_source.exr), for \
+             `texforge apply`; the photo must not be scaled then"))
+        .arg(args::switch("force", "Overwrite outputs that exist already"))
+        .arg(args::json())
+        .arg(args::switch("quiet", "Say nothing but errors").short('q'))
+        .next_help_heading("Running")
+        .args(args::running())
+}
+
+/// What was typed.
+#[derive(Debug)]
+struct Request {
+    photo: PathBuf,
+    folder: PathBuf,
+    params: ExtractParams,
+    mask: Option<PathBuf>,
+    maps: Vec<Wanted>,
+    source_maps: bool,
+    force: bool,
+}
+
+/// The `--json` object.
+#[derive(Debug, Serialize)]
+struct Summary {
+    schema_version: u32,
+    verb: &'static str,
+    version: &'static str,
+    seed: u64,
+    threads: usize,
+    params: serde_json::Value,
+    photo: Written,
+    period: serde_json::Value,
+    tile_size: (usize, usize),
+    scale: (f64, f64),
+    scaled_size: (usize, usize),
+    alpha: f64,
+    beta: f64,
+    positions: usize,
+    tiles: Vec<Tile>,
+    files: Vec<Written>,
+    seconds: serde_json::Value,
+    notes: Vec<String>,
+}
+
+#[derive(Debug, Serialize)]
+struct Tile {
+    /// In the scaled photo.
+    x: usize,
+    y: usize,
+    photo_place: [f64; 2],
+    continuity: f64,
+    resemblance: f64,
+    score: f64,
+}
+
+/// Runs `texforge extract`.
+///
+/// # Errors
+/// Whatever keeps it from being done; then no file was written.
+pub(super) fn run(matches: &ArgMatches) -> Result<()> {
+    let path = |id| matches.get_one::<PathBuf>(id).cloned();
+    let maps = matches.get_many::<OsString>("map").into_iter().flatten();
+    let request = Request {
+        photo: path("photo").unwrap_or_default(),
+        folder: path("output").unwrap_or_default(),
+        params: params(matches)?,
+        mask: path("mask"),
+        maps: maps::typed(maps, 1)?,
+        source_maps: matches.get_flag("save-source-maps"),
+        force: matches.get_flag("force"),
+    };
+    let folder = request.folder.clone();
+    let was_there = folder.exists();
+    let (ctx, session) = Session::begin(matches)?;
+    let done = supervise(&session, move |session| work(session, &ctx, &request));
+    if done.is_err() && !was_there {
+        // Only if it is empty; the first error is the one to tell.
+        let _ = std::fs::remove_dir(&folder);
+    }
+    let (summary, lines) = done?;
+    lines.iter().for_each(|line| session.console.say(line));
+    if matches.get_flag("json") { print_json(&summary) } else { Ok(()) }
+}
+
+fn params(matches: &ArgMatches) -> Result<ExtractParams> {
+    let mut params = ExtractParams::default();
+    for param in ExtractParams::schema() {
+        if let Some(text) = matches.get_one::<String>(param.name) {
+            params.set(param.name, text)?;
+        }
+    }
+    params.validate()?;
+    Ok(params)
+}
+
+/// What a tile's files are called; the first is number 1.
+fn name(role: &str, i: usize, like: &Picture) -> String {
+    let extension = if like.samples().is_float() { "exr" } else { "png" };
+    format!("{role}_{:02}.{extension}", i + 1)
+}
+
+impl Request {
+    /// Fails if the folder cannot be, or holds one of the files already.
+    fn check_places(&self, photo: Option<&Picture>, maps: &[Picture]) -> Result<()> {
+        let folder = &self.folder;
+        if folder == Path::new("-") {
+            return Err(Error::parameter("output", "a folder, as there are several files", "`-`"));
+        }
+        if !folder.exists() {
+            // What could be made here could be made in it.
+            return files::check_place(&folder.with_file_name(".texforge.png"), &[], true).map_err(
+                |error| match error {
+                    Error::Io { action, source, .. } => {
+                        Error::Io { action, path: folder.clone(), source }
+                    }
+                    error => error,
+                },
+            );
+        }
+        if !folder.is_dir() {
+            return Err(Error::Exists { path: folder.clone() });
+        }
+        let mut names = vec!["sheet.png".to_owned()];
+        for i in 0..self.params.count {
+            names.extend(photo.map(|photo| name("tile", i, photo)));
+            names.extend(photo.map(|photo| name("tiling", i, photo)));
+            names.extend(self.source_maps.then(|| format!("tile_{:02}_source.exr", i + 1)));
+            let tile = photo.map(|photo| folder.join(name("tile", i, photo)));
+            for (wanted, map) in self.maps.iter().zip(maps) {
+                let path = tile.as_ref().map(|tile| maps::output_path(tile, wanted.name, map));
+                names
+                    .extend(path.and_then(|p| Some(p.file_name()?.to_string_lossy().into_owned())));
+            }
+        }
+        let mut inputs: Vec<&Path> = vec![&self.photo];
+        inputs.extend(self.mask.iter().map(PathBuf::as_path));
+        inputs.extend(self.maps.iter().flat_map(|m| &m.paths).map(PathBuf::as_path));
+        names
+            .iter()
+            .try_for_each(|name| files::check_place(&folder.join(name), &inputs, self.force))
+    }
+}
+
+fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Vec<String>)> {
+    request.check_places(None, &[])?;
+    let mut photo = files::read(&request.photo, MapKind::Color)?;
+    let mut notes = std::mem::take(&mut photo.meta.notes);
+    session.check()?;
+    let mask = match &request.mask {
+        None => None,
+        Some(path) => Some(Mask::from_picture(&files::read(path, MapKind::Color)?)?),
+    };
+    let mut maps = Vec::new();
+    for wanted in &request.maps {
+        session.check()?;
+        let map = files::read(&wanted.paths[0], wanted.kind)?;
+        map.ensure_finite(&format!("the map `{}`", wanted.name))?;
+        let shown = format!("{} ({})", wanted.name, wanted.paths[0].display());
+        let fits = Inputs::new(&photo);
+        fits.ensure_maps_fit(&shown, &[&map], wanted.kind, &TileParams::default())?;
+        maps.push(map);
+    }
+    request.check_places(Some(&photo), &maps)?;
+    let first = request.folder.join(name("tile", 0, &photo));
+    files::ensure_can_hold(&photo, Some(&first), MapKind::Color)?;
+    session.check()?;
+
+    let made = extract(ctx, &photo, mask.as_ref(), &request.params)?;
+    if request.source_maps && made.source_map(0).is_none() {
+        let expected = "`off` when source maps are wanted: the period is no whole number of pixels";
+        return Err(Error::parameter("scale", expected, "`down`"));
+    }
+    notes.extend(made.report.notes.iter().cloned());
+    let written = write(session, request, &made, &maps)?;
+
+    notes.iter().for_each(|note| session.console.say(&format!("note: {note}")));
+    let elapsed = session.console.elapsed();
+    let lines = lines(request, &made, elapsed);
+    Ok((summary(ctx, request, made, written, notes, elapsed.as_secs_f64()), lines))
+}
+
+/// Writes everything: all of it or nothing.
+fn write(
+    session: &Session,
+    request: &Request,
+    made: &Extraction,
+    maps: &[Picture],
+) -> Result<Vec<Written>> {
+    let mut all: Vec<(Written, Vec<u8>)> = Vec::new();
+    let mut add =
+        |role, map: Option<&str>, name: &str, picture: &Picture, kind, record: Option<&str>| {
+            session.check()?;
+            let path = request.folder.join(name);
+            let bytes = files::encode(picture, Some(&path), kind, record)?;
+            all.push((Written::new(role, map, &path, picture.width(), picture.height()), bytes));
+            Ok::<_, Error>(())
+        };
+    let mut of_maps = Vec::new();
+    for (wanted, map) in request.maps.iter().zip(maps) {
+        of_maps.push((wanted, made.tiles_of(map, wanted.kind)?));
+    }
+    let mut source_maps = Vec::new();
+    for (i, tile) in made.tiles.iter().enumerate() {
+        let picture = &tile.picture;
+        let file = name("tile", i, picture);
+        add("tile", None, &file, picture, MapKind::Color, Some(&record(made, i)))?;
+        for (wanted, tiles) in &of_maps {
+            let path = maps::output_path(Path::new(&file), wanted.name, &tiles[i]);
+            let path = path.to_string_lossy();
+            add("map", Some(wanted.name), &path, &tiles[i], wanted.kind, None)?;
+        }
+        let tiling = made.tiling(i)?;
+        add("tiling", None, &name("tiling", i, picture), &tiling, MapKind::Color, None)?;
+        if let Some(map) = made.source_map(i).filter(|_| request.source_maps) {
+            let path = request.folder.join(format!("tile_{:02}_source.exr", i + 1));
+            let bytes = files::encode_source_map(map, &path)?;
+            let written = Written::new("source_map", None, &path, map.width(), map.height());
+            source_maps.push((written, bytes));
+        }
+    }
+    add("sheet", None, "sheet.png", &made.sheet()?, MapKind::Color, None)?;
+    all.extend(source_maps);
+    if !request.folder.exists() {
+        std::fs::create_dir(&request.folder).map_err(Error::io("write", &request.folder))?;
+    }
+    for (written, bytes) in &all {
+        session.staging.stage(session, Path::new(&written.path), bytes)?;
+    }
+    session.staging.commit(session, request.force)?;
+    Ok(all.into_iter().map(|(written, _)| written).collect())
+}
+
+/// How a tile was made, for the file itself. Holds nothing that differs between equal runs.
+fn record(made: &Extraction, i: usize) -> String {
+    let (report, tile) = (&made.report, &made.tiles[i]);
+    json!({
+        "tool": "texforge",
+        "version": report.version,
+        "verb": ExtractParams::VERB,
+        "seed": report.seed,
+        "params": typed_params(report),
+        "period": report.period.sides,
+        "scale": report.scale,
+        "photo_place": tile.photo_place,
+    })
+    .to_string()
+}
+
+fn typed_params(report: &ExtractReport) -> serde_json::Value {
+    let schema = ExtractParams::schema();
+    let value =
+        |(param, (name, text)): (_, &(&str, String))| ((*name).to_owned(), typed(param, text));
+    schema.iter().zip(&report.params).map(value).collect::<serde_json::Map<_, _>>().into()
+}
+
+fn lines(request: &Request, made: &Extraction, elapsed: std::time::Duration) -> Vec<String> {
+    let (w, h) = made.report.tile_size;
+    let line = |(i, tile): (usize, &crate::verb::extract::ExtractedTile)| {
+        let [x, y] = tile.photo_place;
+        format!(
+            "{}  {w}x{h} from {x:.1}, {y:.1}: score {:.2} (continuity {:.2}, resemblance {:.2})",
+            request.folder.join(name("tile", i, &tile.picture)).display(),
+            tile.place.score,
+            tile.place.continuity,
+            tile.place.resemblance,
+        )
+    };
+    let mut lines: Vec<String> = made.tiles.iter().enumerate().map(line).collect();
+    let sheet = request.folder.join("sheet.png");
+    lines.push(format!("{}  (all and their tilings), {}", sheet.display(), duration(elapsed)));
+    lines
+}
+
+fn summary(
+    ctx: &Ctx,
+    request: &Request,
+    made: Extraction,
+    files: Vec<Written>,
+    notes: Vec<String>,
+    total: f64,
+) -> Summary {
+    let tile = |tile: &crate::verb::extract::ExtractedTile| Tile {
+        x: tile.place.x,
+        y: tile.place.y,
+        photo_place: tile.photo_place,
+        continuity: tile.place.continuity,
+        resemblance: tile.place.resemblance,
+        score: tile.place.score,
+    };
+    let report = made.report;
+    let (width, height) = report.photo_size;
+    let stages = report.seconds.iter().map(|(name, seconds)| ((*name).to_owned(), json!(seconds)));
+    let stages: serde_json::Map<_, _> = stages.collect();
+    Summary {
+        schema_version: SCHEMA_VERSION,
+        verb: ExtractParams::VERB,
+        version: report.version,
+        seed: report.seed,
+        threads: ctx.threads(),
+        params: typed_params(&report),
+        photo: Written::new("photo", None, &request.photo, width, height),
+        period: json!(report.period),
+        tile_size: report.tile_size,
+        scale: report.scale,
+        scaled_size: report.scaled_size,
+        alpha: report.alpha,
+        beta: report.beta,
+        positions: report.positions,
+        tiles: made.tiles.iter().map(tile).collect(),
+        files,
+        seconds: json!({ "stages": stages, "total": total }),
+        notes,
+    }
+}

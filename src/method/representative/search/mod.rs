@@ -1,0 +1,369 @@
+//! What a tile at every position would cost, and the best positions.
+
+use rayon::prelude::*;
+
+use crate::base::ctx::Ctx;
+use crate::base::error::Result;
+
+/// Largest code. A difference squared and summed over three channels is below 2^28, so a sum over all
+/// pairs of 2^32 pixels fits 64 bits.
+const MOST: f32 = 8191.0;
+
+/// Steps of progress that [`Costs::new`] counts.
+pub const STEPS: u64 = 3;
+
+/// The colours of a picture as integers: all sums are exact, whatever their order.
+#[derive(Debug, Clone)]
+pub struct Codes {
+    height: usize,
+    width: usize,
+    pixels: Vec<[i16; 3]>,
+    /// One flag a pixel; `None` is everywhere.
+    usable: Option<Vec<bool>>,
+    /// What a code is worth.
+    step: f64,
+}
+
+impl Codes {
+    /// Of `pixels`, row by row, any range: one scale for all channels, such that the widest range of
+    /// the `usable` pixels fills it. What is not usable has no say.
+    ///
+    /// # Panics
+    /// If the pixels or the flags do not fill the picture.
+    pub fn new(
+        pixels: &[[f32; 3]],
+        (height, width): (usize, usize),
+        usable: Option<Vec<bool>>,
+    ) -> Self {
+        assert_eq!(pixels.len(), height * width, "pixels do not fill the picture");
+        assert!(usable.as_ref().is_none_or(|u| u.len() == pixels.len()), "flags do not fill it");
+        let (mut low, mut high) = ([f32::MAX; 3], [f32::MIN; 3]);
+        for (i, px) in pixels.iter().enumerate() {
+            if usable.as_ref().is_none_or(|u| u[i]) {
+                for k in 0..3 {
+                    (low[k], high[k]) = (low[k].min(px[k]), high[k].max(px[k]));
+                }
+            }
+        }
+        let widest = (0..3).map(|k| high[k] - low[k]).fold(0.0, f32::max);
+        let scale = if widest > 0.0 { MOST / widest } else { 0.0 };
+        let code = |px: &[f32; 3]| {
+            std::array::from_fn(|k| ((px[k] - low[k]) * scale).round().clamp(0.0, MOST) as i16)
+        };
+        let step = f64::from(widest) / f64::from(MOST);
+        Self { height, width, pixels: pixels.par_iter().map(code).collect(), usable, step }
+    }
+
+    /// The codes, row by row.
+    pub fn pixels(&self) -> &[[i16; 3]] {
+        &self.pixels
+    }
+
+    /// What a code is worth, in the units that the pixels came in.
+    pub fn step(&self) -> f64 {
+        self.step
+    }
+
+    fn is_usable(&self, i: usize) -> bool {
+        self.usable.as_ref().is_none_or(|u| u[i])
+    }
+}
+
+/// A position of the tile, and what it costs there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Place {
+    /// Row of the tile's first pixel.
+    pub y: usize,
+    /// Its column.
+    pub x: usize,
+    /// The mean squared difference of the pixels that meet where tiles do: h(T).
+    pub continuity: f64,
+    /// The mean squared difference of the picture and the tiling: SSDN(I, I_T).
+    pub resemblance: f64,
+    /// alpha h + beta SSDN.
+    pub score: f64,
+}
+
+/// What a tile costs at every position.
+#[derive(Debug, Clone)]
+pub struct Costs {
+    /// Positions: how many rows and columns of them.
+    rows: usize,
+    cols: usize,
+    tile: (usize, usize),
+    /// c(T) of eq. 5, in codes; `NOWHERE` where the tile would hold a pixel that is not usable.
+    seams: Vec<u64>,
+    /// The squared differences of the picture and the tiling, summed, in codes.
+    unlike: Vec<u64>,
+    /// From those sums to means in the units of the pixels.
+    per_seam: f64,
+    per_unlike: f64,
+}
+
+const NOWHERE: u64 = u64::MAX;
+
+impl Costs {
+    /// Of tiles of size `tile` (height, width) anywhere in the picture.
+    ///
+    /// A tile holds one pixel of each residue class modulo its size, wherever it lies, and its tiling
+    /// has that pixel at all places of the class. So what the pixel q adds to the difference is known
+    /// before any tile is: the sum over its class of (I(p) - I(q))^2 = S2 - 2 I(q) S1 + n I(q)^2,
+    /// and a tile's difference is the sum over its box.
+    ///
+    /// # Paper
+    /// Sec. 4.1, eq. 5, and sec. 4.2, with p = 1. Pixels that are not usable are not compared.
+    ///
+    /// # Determinism
+    /// Integers: exact.
+    ///
+    /// # Cost
+    /// Linear in the pixels, whatever the size of the tile; about 56 bytes a pixel.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`](crate::Error::Cancelled).
+    ///
+    /// # Panics
+    /// If the tile is empty or larger than the picture.
+    pub fn new(ctx: &Ctx, codes: &Codes, tile: (usize, usize)) -> Result<Self> {
+        let (h, w) = (codes.height, codes.width);
+        let (th, tw) = tile;
+        assert!((1..=h).contains(&th) && (1..=w).contains(&tw), "a {tw}x{th} tile of {w}x{h}");
+        let (rows, cols) = (h - th + 1, w - tw + 1);
+        let boxed = |value: &(dyn Fn(usize, usize) -> u64 + Sync)| {
+            box_sums(&integral(value, (h, w)), w, (rows, cols), tile)
+        };
+        let classes = classes(codes, tile);
+        ctx.step(1)?;
+        let unlike = boxed(&|y, x| {
+            let i = y * w + x;
+            if codes.is_usable(i) { classes[y % th * tw + x % tw].cost(codes.pixels[i]) } else { 0 }
+        });
+        ctx.step(1)?;
+        let mut seams = seams(codes, (rows, cols), tile);
+        if let Some(usable) = &codes.usable {
+            let holes = boxed(&|y, x| u64::from(!usable[y * w + x]));
+            seams.iter_mut().zip(holes).filter(|(_, holes)| *holes > 0).for_each(|(seam, _)| {
+                *seam = NOWHERE;
+            });
+        }
+        ctx.step(1)?;
+        let count = (0..h * w).filter(|&i| codes.is_usable(i)).count();
+        let unit = codes.step * codes.step;
+        let per_seam = unit / (2 * (tw + th - 1)) as f64;
+        let per_unlike = unit / count.max(1) as f64;
+        Ok(Self { rows, cols, tile, seams, unlike, per_seam, per_unlike })
+    }
+
+    /// How many positions hold no unusable pixel.
+    pub fn count(&self) -> usize {
+        self.seams.iter().filter(|seam| **seam != NOWHERE).count()
+    }
+
+    /// The weight of continuity at which it counts as much as resemblance: what there is to gain in
+    /// either, from the mean to the least, is then the same. 1 if every tile is as continuous.
+    pub fn balanced_weight(&self) -> f64 {
+        let gain = |values: &[u64]| {
+            let usable = values.iter().zip(&self.seams).filter(|(_, seam)| **seam != NOWHERE);
+            let (mut sum, mut n, mut least) = (0u128, 0u64, u64::MAX);
+            for (&value, _) in usable {
+                (sum, n, least) = (sum + u128::from(value), n + 1, least.min(value));
+            }
+            if n == 0 { 0.0 } else { sum as f64 / n as f64 - least as f64 }
+        };
+        let (seam, unlike) =
+            (gain(&self.seams) * self.per_seam, gain(&self.unlike) * self.per_unlike);
+        if seam > 0.0 { unlike / seam } else { 1.0 }
+    }
+
+    /// The best position by `alpha` h + `beta` SSDN, then the best of those left, and so on up to
+    /// `count`: no two overlap by more than `overlap` of a tile's area. Of equals the first counts.
+    /// Only the share `keep` of the positions is looked at, those with the least h (the paper's p).
+    pub fn best(
+        &self,
+        (alpha, beta): (f64, f64),
+        keep: f64,
+        overlap: f64,
+        count: usize,
+    ) -> Vec<Place> {
+        let most = self.seam_of_kept(keep);
+        let score = |i: usize| {
+            let (h, ssdn) = self.means(i);
+            alpha * h + beta * ssdn
+        };
+        let mut chosen: Vec<usize> = Vec::new();
+        while chosen.len() < count {
+            let best_of_row = |y: usize| {
+                let mut best: Option<(f64, usize)> = None;
+                for i in y * self.cols..(y + 1) * self.cols {
+                    if (self.seams[i], i) > most || self.seams[i] == NOWHERE {
+                        continue;
+                    }
+                    let score = score(i);
+                    if best.is_none_or(|(least, _)| score < least)
+                        && chosen.iter().all(|&j| i != j && self.shared(i, j) <= overlap)
+                    {
+                        best = Some((score, i));
+                    }
+                }
+                best
+            };
+            let best: Vec<_> = (0..self.rows).into_par_iter().map(best_of_row).collect();
+            let best = best.into_iter().flatten().reduce(|a, b| if b.0 < a.0 { b } else { a });
+            let Some((_, i)) = best else { break };
+            chosen.push(i);
+        }
+        let place = |i: usize| {
+            let (continuity, resemblance) = self.means(i);
+            let (y, x) = (i / self.cols, i % self.cols);
+            Place { y, x, continuity, resemblance, score: score(i) }
+        };
+        chosen.into_iter().map(place).collect()
+    }
+
+    /// h and SSDN of a position.
+    fn means(&self, i: usize) -> (f64, f64) {
+        (self.seams[i] as f64 * self.per_seam, self.unlike[i] as f64 * self.per_unlike)
+    }
+
+    /// The share of a tile's area that tiles at two positions have in common.
+    fn shared(&self, i: usize, j: usize) -> f64 {
+        let (th, tw) = self.tile;
+        let dy = (i / self.cols).abs_diff(j / self.cols).min(th);
+        let dx = (i % self.cols).abs_diff(j % self.cols).min(tw);
+        ((th - dy) * (tw - dx)) as f64 / (th * tw) as f64
+    }
+
+    /// The worst seam, with its position, that the share `keep` of the positions still holds.
+    fn seam_of_kept(&self, keep: f64) -> (u64, usize) {
+        if keep >= 1.0 {
+            return (NOWHERE, usize::MAX);
+        }
+        let mut all: Vec<(u64, usize)> =
+            self.seams.iter().copied().zip(0..).filter(|(seam, _)| *seam != NOWHERE).collect();
+        let kept = ((all.len() as f64 * keep).ceil() as usize).clamp(1, all.len().max(1));
+        if all.is_empty() {
+            return (0, 0);
+        }
+        *all.select_nth_unstable(kept - 1).1
+    }
+}
+
+/// The usable pixels that lie whole tiles apart.
+#[derive(Debug, Clone, Copy, Default)]
+struct Class {
+    n: i64,
+    sum: [i64; 3],
+    /// Of all channels.
+    squares: i64,
+}
+
+impl Class {
+    /// The squared differences of all its pixels from a colour.
+    #[inline]
+    fn cost(&self, px: [i16; 3]) -> u64 {
+        let px = px.map(i64::from);
+        let product: i64 = (0..3).map(|k| px[k] * self.sum[k]).sum();
+        let square: i64 = (0..3).map(|k| px[k] * px[k]).sum();
+        (self.squares - 2 * product + self.n * square) as u64
+    }
+}
+
+fn classes(codes: &Codes, (th, tw): (usize, usize)) -> Vec<Class> {
+    let (h, w) = (codes.height, codes.width);
+    let mut classes = vec![Class::default(); th * tw];
+    classes.par_chunks_mut(tw).enumerate().for_each(|(r, classes)| {
+        for y in (r..h).step_by(th) {
+            for left in (0..w).step_by(tw) {
+                let at = y * w + left;
+                let pixels = &codes.pixels[at..at + tw.min(w - left)];
+                for (k, (class, px)) in classes.iter_mut().zip(pixels).enumerate() {
+                    if codes.is_usable(at + k) {
+                        class.n += 1;
+                        for (sum, &v) in class.sum.iter_mut().zip(px) {
+                            let v = i64::from(v);
+                            *sum += v;
+                            class.squares += v * v;
+                        }
+                    }
+                }
+            }
+        }
+    });
+    classes
+}
+
+/// Sums over all pixels above and to the left, a row and a column more than the picture. They may run
+/// over; differences of them do not, as long as what they stand for fits.
+fn integral(value: &(dyn Fn(usize, usize) -> u64 + Sync), (h, w): (usize, usize)) -> Vec<u64> {
+    let mut sums = vec![0u64; (h + 1) * (w + 1)];
+    sums[w + 1..].par_chunks_mut(w + 1).enumerate().for_each(|(y, row)| {
+        let mut sum = 0u64;
+        for (x, out) in row[1..].iter_mut().enumerate() {
+            sum = sum.wrapping_add(value(y, x));
+            *out = sum;
+        }
+    });
+    add_up(&mut sums, w + 1);
+    sums
+}
+
+/// Adds to every row all those above it.
+fn add_up(rows: &mut [u64], width: usize) {
+    for y in 1..rows.len() / width {
+        let (above, row) = rows.split_at_mut(y * width);
+        let above = &above[(y - 1) * width..];
+        row.iter_mut().zip(above).for_each(|(v, above)| *v = v.wrapping_add(*above));
+    }
+}
+
+fn box_sums(
+    integral: &[u64],
+    w: usize,
+    (rows, cols): (usize, usize),
+    (th, tw): (usize, usize),
+) -> Vec<u64> {
+    let mut sums = vec![0u64; rows * cols];
+    sums.par_chunks_mut(cols).enumerate().for_each(|(y, out)| {
+        let top = &integral[y * (w + 1)..][..w + 1];
+        let bottom = &integral[(y + th) * (w + 1)..][..w + 1];
+        for (x, out) in out.iter_mut().enumerate() {
+            let right = bottom[x + tw].wrapping_sub(top[x + tw]);
+            *out = right.wrapping_sub(bottom[x].wrapping_sub(top[x]));
+        }
+    });
+    sums
+}
+
+/// c(T) of eq. 5 at every position: the first column against the last, the first row against the last.
+fn seams(codes: &Codes, (rows, cols): (usize, usize), (th, tw): (usize, usize)) -> Vec<u64> {
+    let (h, w) = (codes.height, codes.width);
+    let apart = |i: usize, j: usize| -> u64 {
+        let (a, b) = (codes.pixels[i], codes.pixels[j]);
+        (0..3).map(|k| (i64::from(a[k]) - i64::from(b[k])).pow(2) as u64).sum()
+    };
+    // Sums over the rows above, of the difference between a pixel and the one a tile to its right.
+    let mut upright = vec![0u64; (h + 1) * cols];
+    upright[cols..].par_chunks_mut(cols).enumerate().for_each(|(y, row)| {
+        for (x, out) in row.iter_mut().enumerate() {
+            *out = apart(y * w + x, y * w + x + tw - 1);
+        }
+    });
+    add_up(&mut upright, cols);
+    let mut seams = vec![0u64; rows * cols];
+    seams.par_chunks_mut(cols).enumerate().for_each_init(
+        || vec![0u64; w + 1],
+        |level, (y, out)| {
+            for x in 0..w {
+                level[x + 1] = level[x] + apart(y * w + x, (y + th - 1) * w + x);
+            }
+            for (x, out) in out.iter_mut().enumerate() {
+                let across = upright[(y + th) * cols + x] - upright[y * cols + x];
+                *out = across + (level[x + tw] - level[x]);
+            }
+        },
+    );
+    seams
+}
+
+#[cfg(test)]
+mod tests;
