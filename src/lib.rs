@@ -46,5 +46,8 @@ pub use verb::lattice::{Lattice, LatticeParams, detect_lattice, lattice_autocorr
 pub use verb::palette::{Palette, palette};
 pub use verb::params::{Axis, Follow, Measure, Method, Quality, Size, Symmetries, TileParams};
 pub use verb::redo::Redo;
+pub use verb::regular::{
+    Guide, Regular, RegularMaker, RegularParams, RegularReport, RegularStrip, regular,
+};
 pub use verb::texture_cost::{TextureCost, TextureCostParams, texture_cost};
 pub use verb::tile::{Costs, Report, Step, Tile, tile, tiles};

@@ -51,6 +51,34 @@ impl Value for Option<f32> {
     }
 }
 
+/// A value that is chosen by itself unless it is given: `auto`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OrAuto<T> {
+    /// Chosen by itself.
+    Auto,
+    /// This one.
+    Given(T),
+}
+
+impl<T: Value> Value for OrAuto<T> {
+    const KIND: &'static str = T::KIND;
+
+    fn parse(text: &str) -> Option<Self> {
+        if text == "auto" { Some(Self::Auto) } else { T::parse(text).map(Self::Given) }
+    }
+
+    fn show(&self) -> String {
+        match self {
+            Self::Auto => "auto".into(),
+            Self::Given(value) => value.show(),
+        }
+    }
+
+    fn expected() -> String {
+        format!("{}, or auto", T::expected())
+    }
+}
+
 /// One parameter as the faces see it.
 #[derive(Debug, Clone)]
 pub struct Param {

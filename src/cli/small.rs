@@ -24,8 +24,7 @@ pub(super) const SCHEMA_VERSION: u32 = 1;
 type Schema = (&'static str, fn() -> Vec<Param>);
 
 /// The commands that have parameters of their own.
-pub(super) const SCHEMAS: &[Schema] =
-    &[
+pub(super) const SCHEMAS: &[Schema] = &[
     (TileParams::VERB, TileParams::schema),
     (LatticeParams::VERB, LatticeParams::schema),
     (ExtractParams::VERB, ExtractParams::schema),

@@ -7,5 +7,6 @@ mod maker;
 pub mod palette;
 pub mod params;
 pub mod redo;
+pub mod regular;
 pub mod texture_cost;
 pub mod tile;

@@ -89,6 +89,13 @@ impl Drift {
         })
     }
 
+    /// How far the cells are displaced, in pixels: the root of the mean square, and the most.
+    pub fn extent(&self) -> (f64, f64) {
+        let squares = self.of.iter().map(|v| v[0] * v[0] + v[1] * v[1]);
+        let most = squares.clone().fold(0.0, f64::max);
+        ((squares.sum::<f64>() / self.of.len() as f64).sqrt(), most.sqrt())
+    }
+
     /// One round: the mean cell, and every cell's place against it.
     fn improve(
         &mut self,

@@ -39,18 +39,30 @@ pub struct Snap {
 /// there is none from half to twice the wished side. `lean` is the misfit allowed beside the usual, as a
 /// share of the displacement: 0 for what is cut out as it is.
 pub fn snap(basis: Basis, (width, height): (usize, usize), lean: f64) -> Option<Snap> {
-    let (w, scale_x, a, misfit_x) = along(basis, width, lean)?;
+    let Side { length: w, scale: scale_x, periods: a, misfit: misfit_x } =
+        side(basis, width, lean)?;
     // The vertical axis is the horizontal one of the transposed lattice.
-    let (h, scale_y, b, misfit_y) = along(basis.map(|[x, y]| [y, x]), height, lean)?;
+    let Side { length: h, scale: scale_y, periods: b, misfit: misfit_y } =
+        side(basis.map(|[x, y]| [y, x]), height, lean)?;
     let periods = [a, b];
     Some(Snap { width: w, height: h, scale_x, scale_y, periods, misfit: [misfit_x, misfit_y] })
 }
 
-/// Side, scaling, coefficients and misfit of a displacement along an axis.
-type Side = (usize, f64, [i64; 2], f64);
+/// A displacement along one axis: see [`Snap`] for what it is made of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Side {
+    /// In pixels of the output.
+    pub length: usize,
+    /// Of the photo.
+    pub scale: f64,
+    /// How often v1 and v2 are in it.
+    pub periods: [i64; 2],
+    /// By how many pixels of the photo it leaves the axis.
+    pub misfit: f64,
+}
 
-/// The best displacement along the first axis.
-fn along(basis: Basis, wish: usize, lean: f64) -> Option<Side> {
+/// The best displacement along the first axis: [`snap`] for one side alone.
+pub fn side(basis: Basis, wish: usize, lean: f64) -> Option<Side> {
     let far = 2.0 * wish as f64;
     let upright = MISFIT_PIXELS.max(MISFIT * dot(basis[0], basis[0]).sqrt());
     let most_off = upright.max(lean * far);
@@ -79,7 +91,8 @@ fn along(basis: Basis, wish: usize, lean: f64) -> Option<Side> {
                 + (side as f64 / length - 1.0).abs()
                 + MISFIT_COST * off.abs() / allowed;
             if best.is_none_or(|(least, _)| cost < least) {
-                best = Some((cost, (side, side as f64 / length, periods, off.abs())));
+                let scale = side as f64 / length;
+                best = Some((cost, Side { length: side, scale, periods, misfit: off.abs() }));
             }
         }
     }
