@@ -14,7 +14,7 @@ use texforge::signal::self_difference::self_difference;
 
 /// A picture that repeats by a cell of this size (height, width), with noise.
 fn cloth((h, w): (usize, usize), (ch, cw): (usize, usize)) -> Vec<[f32; 3]> {
-    let value = |stage: u64, i: usize, range: u32| {
+    let value = |stage: u32, i: usize, range: u32| {
         let mut rng = Rng::new(1, stage, 0, i as u64);
         [0; 3].map(|_: i32| rng.below(range) as f32)
     };

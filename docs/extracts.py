@@ -2,7 +2,7 @@
 
 A row of a class's sheet shows the photograph, the best tile repeated over as much, and the same
 with a border made anew, all at full size, so that seams show. Prints how each period was found,
-what was refused, and how long it took; a class that does not repeat shows what is taken for a period.
+what was refused, and how long it took; of a class that does not repeat, what passes for a period.
 """
 
 from __future__ import annotations

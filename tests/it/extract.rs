@@ -139,7 +139,7 @@ mod periods {
     fn a_strong_harmonic_is_not_the_period() {
         // Every second stripe is narrower: the first minimum is that of the half period.
         let photo = grey((200, 320), 0.2, |y, x| {
-            let width = if (x / 20.0) as usize % 2 == 0 { 0.5 } else { 0.2 };
+            let width = if ((x / 20.0) as usize).is_multiple_of(2) { 0.5 } else { 0.2 };
             let stripe = if (x / 20.0).fract() < width { 0.4 } else { 0.0 };
             let row = if (y / 25.0).fract() < 0.3 { 0.3 } else { 0.0 };
             0.5 + stripe - row
@@ -165,7 +165,7 @@ mod periods {
 mod tiles {
     use super::*;
 
-    /// The mean squared difference of two pictures of grey data, in units of full scale 100.
+    /// The mean squared difference of two pictures of grey data, full scale 100.
     fn apart(a: &Picture, b: &Picture, usable: impl Fn(usize) -> bool) -> f64 {
         let (a, b) = (a.samples(), b.samples());
         let all: Vec<usize> = (0..a.len()).filter(|&i| usable(i)).collect();
@@ -293,6 +293,28 @@ mod tiles {
             (8..24).flat_map(|y| v[y * 36 + 8..y * 36 + 28].to_vec()).collect::<Vec<u8>>()
         };
         assert_eq!(middle(&plain), middle(&banded));
+    }
+
+    #[test]
+    fn a_band_is_in_phase_wherever_the_tile_lies() {
+        // A chequerboard whose best tile lies anywhere but at whole periods.
+        let photo = grey((170, 190), 0.1, |y, x| {
+            let dark = ((x + 13.0) / 20.0) as usize % 2 == ((y + 7.0) / 20.0) as usize % 2;
+            0.5 + if dark { -0.25 } else { 0.25 }
+        });
+        let params = ExtractParams { band: 8, count: 3, ..given(40.0, 40.0) };
+        let found = of(&photo, &params);
+        assert!(found.tiles.iter().any(|t| t.place.y % 40 > 5 || t.place.x % 40 > 5), "no test");
+        for (i, tile) in found.tiles.iter().enumerate() {
+            let unlike = apart_as_seen(&photo, &found.tiling(i).expect("tiling"));
+            assert!(unlike < 0.01, "tile {i} at {:?}: {unlike}", tile.place);
+        }
+    }
+
+    /// The mean squared difference of two grey pictures, full scale 1.
+    fn apart_as_seen(a: &Picture, b: &Picture) -> f64 {
+        let n = a.samples().len();
+        (0..n).map(|i| (a.samples().unit(i) - b.samples().unit(i)).powi(2)).sum::<f64>() / n as f64
     }
 
     #[test]

@@ -244,8 +244,8 @@ pub fn extract(
         positions,
         seconds: vec![
             ("period", analysis.as_secs_f64()),
-            ("search", (searched - analysis).as_secs_f64()),
-            ("tiles", (made - searched).as_secs_f64()),
+            ("search", searched.saturating_sub(analysis).as_secs_f64()),
+            ("tiles", made.saturating_sub(searched).as_secs_f64()),
         ],
         notes,
     };

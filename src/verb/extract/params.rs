@@ -74,7 +74,7 @@ params! {
         /// Weight of continuity, of how well a tile's edges fit each other; none chooses it such that it counts as much as resemblance.
         alpha: Option<f32> = None;
         /// Weight of resemblance, of how much the tiling is like the photo.
-        beta: f32 = 1.0, in 0.0..=1000000.0;
+        beta: f32 = 1.0, in 0.0..=1_000_000.0;
         /// Share of the positions that is looked at, those with the best fitting edges: the paper's p. 1 looks at all, and takes no longer.
         keep: f32 = 1.0, in 0.0..=1.0;
         /// How much two tiles may overlap, as a share of their area.
