@@ -8,7 +8,7 @@ use clap::{Arg, ArgAction, ArgMatches, Command, ValueHint, value_parser};
 use crate::base::params::{Param, Value as _};
 use crate::cli::small::SCHEMAS;
 use crate::cli::sources::Sources;
-use crate::cli::{extract, maps, palette, study};
+use crate::cli::{extract, maps, palette, regular, study};
 use crate::image::material::MapKind;
 use crate::verb::lattice::LatticeParams;
 use crate::verb::params::TileParams;
@@ -58,6 +58,7 @@ pub(super) fn command() -> Command {
         .arg_required_else_help(true)
         .subcommand(tile())
         .subcommand(palette::command())
+        .subcommand(regular::command())
         .subcommand(extract::command())
         .subcommand(apply())
         .subcommand(lattice())
@@ -103,7 +104,7 @@ pub(super) fn command() -> Command {
                 .arg(
                     Arg::new("verb")
                         .value_name("COMMAND")
-                        .value_parser(["tile", "palette", "extract", "apply", "lattice", "study", "params", "info", "completions"])
+                        .value_parser(["tile", "palette", "regular", "extract", "apply", "lattice", "study", "params", "info", "completions"])
                         .help("The page of this command"),
                 ),
         )
@@ -304,6 +305,7 @@ pub(super) fn flag(param: Param) -> Arg {
         .value_parser(parser)
         // A negative number is out of range, not an unknown flag.
         .allow_negative_numbers(true)
+        .allow_hyphen_values(param.kind == "lattice")
         .help_heading("Parameters")
         .help(help)
 }

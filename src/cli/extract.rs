@@ -3,8 +3,7 @@
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-use clap::builder::ValueParser;
-use clap::{Arg, ArgAction, ArgMatches, Command};
+use clap::{ArgMatches, Command};
 use serde::Serialize;
 use serde_json::json;
 
@@ -12,15 +11,15 @@ use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
 use crate::cli::maps::{self, Wanted};
 use crate::cli::show::duration;
-use crate::cli::small::{SCHEMA_VERSION, print_json, typed};
+use crate::cli::small::{SCHEMA_VERSION, print_json};
 use crate::cli::sources::Sources;
-use crate::cli::summary::Written;
+use crate::cli::summary::{Seconds, Typed, Written, record_of, typed_params};
 use crate::cli::work::{Session, supervise};
 use crate::cli::{args, files};
 use crate::image::mask::Mask;
 use crate::image::material::MapKind;
 use crate::image::picture::Picture;
-use crate::verb::extract::{ExtractParams, ExtractReport, Extraction, extract};
+use crate::verb::extract::{ExtractParams, Extraction, extract};
 use crate::verb::inputs::Inputs;
 use crate::verb::params::TileParams;
 
@@ -48,23 +47,8 @@ pub(super) fn command() -> Command {
         )
         .args(ExtractParams::schema().into_iter().map(args::flag))
         .next_help_heading("Inputs")
-        .arg(
-            args::file("mask", "FILE", "Picture of the photo's size: usable is where its first channel is at least half of \
-                 full scale and its alpha, if any, too; the photo's own transparent pixels are never used")
-                .long("mask"),
-        )
-        .arg(
-            Arg::new("map")
-                .long("map")
-                .value_name("NAME=FILE")
-                .action(ArgAction::Append)
-                .value_parser(ValueParser::os_string())
-                .help(format!(
-                    "A further map of the same surface, cut at the same places (tile_01_NAME.png); may be repeated. \
-                     NAME is one of {}",
-                    maps::known_names()
-                )),
-        )
+        .arg(Sources::mask())
+        .arg(maps::flag("A further map of the same surface, cut at the same places (tile_01_NAME.png); may be repeated"))
         .next_help_heading("Outputs")
         .arg(args::switch("save-source-maps", "Also write which photo pixel each tile pixel is (tile_01_source.exr), for \
              `texforge apply`; the photo must not be scaled then"))
@@ -95,7 +79,7 @@ struct Summary {
     version: &'static str,
     seed: u64,
     threads: usize,
-    params: serde_json::Value,
+    params: Typed,
     photo: Written,
     period: serde_json::Value,
     tile_size: (usize, usize),
@@ -106,7 +90,7 @@ struct Summary {
     positions: usize,
     tiles: Vec<Tile>,
     files: Vec<Written>,
-    seconds: serde_json::Value,
+    seconds: Seconds,
     notes: Vec<String>,
 }
 
@@ -131,7 +115,7 @@ pub(super) fn run(matches: &ArgMatches) -> Result<()> {
     let request = Request {
         photo: path("photo").unwrap_or_default(),
         folder: path("output").unwrap_or_default(),
-        params: params(matches)?,
+        params: ExtractParams::from_texts(args::text(matches))?,
         mask: path("mask"),
         maps: maps::typed(maps, 1)?,
         source_maps: matches.get_flag("save-source-maps"),
@@ -148,17 +132,6 @@ pub(super) fn run(matches: &ArgMatches) -> Result<()> {
     let (summary, lines) = done?;
     lines.iter().for_each(|line| session.console.say(line));
     if matches.get_flag("json") { print_json(&summary) } else { Ok(()) }
-}
-
-fn params(matches: &ArgMatches) -> Result<ExtractParams> {
-    let mut params = ExtractParams::default();
-    for param in ExtractParams::schema() {
-        if let Some(text) = matches.get_one::<String>(param.name) {
-            params.set(param.name, text)?;
-        }
-    }
-    params.validate()?;
-    Ok(params)
 }
 
 /// What a tile's files are called; the first is number 1.
@@ -218,16 +191,7 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Vec
         None => None,
         Some(path) => Some(Mask::from_picture(&files::read(path, MapKind::Color)?)?),
     };
-    let mut maps = Vec::new();
-    for wanted in &request.maps {
-        session.check()?;
-        let map = files::read(&wanted.paths[0], wanted.kind)?;
-        map.ensure_finite(&format!("the map `{}`", wanted.name))?;
-        let shown = format!("{} ({})", wanted.name, wanted.paths[0].display());
-        let fits = Inputs::new(&photo);
-        fits.ensure_maps_fit(&shown, &[&map], wanted.kind, &TileParams::default())?;
-        maps.push(map);
-    }
+    let maps = maps::read(session, &request.maps, &Inputs::new(&photo), &TileParams::default())?;
     request.check_places(Some(&photo), &maps)?;
     let first = request.folder.join(name("tile", 0, &photo));
     files::ensure_can_hold(&photo, Some(&first), MapKind::Color)?;
@@ -301,24 +265,12 @@ fn write(
 /// How a tile was made, for the file itself. Holds nothing that differs between equal runs.
 fn record(made: &Extraction, i: usize) -> String {
     let (report, tile) = (&made.report, &made.tiles[i]);
-    json!({
-        "tool": "texforge",
-        "version": report.version,
-        "verb": ExtractParams::VERB,
-        "seed": report.seed,
-        "params": typed_params(report),
-        "period": report.period.sides,
-        "scale": report.scale,
-        "photo_place": tile.photo_place,
-    })
-    .to_string()
-}
-
-fn typed_params(report: &ExtractReport) -> serde_json::Value {
-    let schema = ExtractParams::schema();
-    let value =
-        |(param, (name, text)): (_, &(&str, String))| ((*name).to_owned(), typed(param, text));
-    schema.iter().zip(&report.params).map(value).collect::<serde_json::Map<_, _>>().into()
+    let params = typed_params(&ExtractParams::schema(), &report.params);
+    let mut record = record_of(ExtractParams::VERB, report.version, report.seed, params);
+    record["period"] = json!(report.period.sides);
+    record["scale"] = json!(report.scale);
+    record["photo_place"] = json!(tile.photo_place);
+    record.to_string()
 }
 
 fn lines(request: &Request, made: &Extraction, elapsed: std::time::Duration) -> Vec<String> {
@@ -357,15 +309,13 @@ fn summary(
     };
     let report = made.report;
     let (width, height) = report.photo_size;
-    let stages = report.seconds.iter().map(|(name, seconds)| ((*name).to_owned(), json!(seconds)));
-    let stages: serde_json::Map<_, _> = stages.collect();
     Summary {
         schema_version: SCHEMA_VERSION,
         verb: ExtractParams::VERB,
         version: report.version,
         seed: report.seed,
         threads: ctx.threads(),
-        params: typed_params(&report),
+        params: typed_params(&ExtractParams::schema(), &report.params),
         photo: Written::new("photo", None, &request.photo, width, height),
         period: json!(report.period),
         tile_size: report.tile_size,
@@ -376,7 +326,7 @@ fn summary(
         positions: report.positions,
         tiles: made.tiles.iter().map(tile).collect(),
         files,
-        seconds: json!({ "stages": stages, "total": total }),
+        seconds: Seconds { stages: report.seconds, total },
         notes,
     }
 }

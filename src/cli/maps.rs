@@ -3,10 +3,16 @@
 use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 
+use clap::builder::ValueParser;
+use clap::{Arg, ArgAction};
+
 use crate::base::error::{Error, Result};
 use crate::cli::files;
+use crate::cli::work::Session;
 use crate::image::material::{MapKind, MapName};
 use crate::image::picture::Picture;
+use crate::verb::inputs::Inputs;
+use crate::verb::params::TileParams;
 
 /// A map as asked for.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -54,6 +60,37 @@ pub(super) fn typed<'a>(
         return Err(Error::parameter("map", expected, times(paths.len())));
     }
     Ok(maps)
+}
+
+/// The flag that maps are typed with; `what` they are.
+pub(super) fn flag(what: &str) -> Arg {
+    Arg::new("map")
+        .long("map")
+        .value_name("NAME=FILE")
+        .action(ArgAction::Append)
+        .value_parser(ValueParser::os_string())
+        .help(format!("{what}. NAME is one of {}", known_names()))
+}
+
+/// Reads maps of one photo, which must fit it.
+///
+/// # Errors
+/// Of a file that cannot be read, or does not fit.
+pub(super) fn read(
+    session: &Session,
+    wanted: &[Wanted],
+    photo: &Inputs<'_>,
+    params: &TileParams,
+) -> Result<Vec<Picture>> {
+    let read = |wanted: &Wanted| {
+        session.check()?;
+        let map = files::read(&wanted.paths[0], wanted.kind)?;
+        map.ensure_finite(&format!("the map `{}`", wanted.name))?;
+        let shown = format!("{} ({})", wanted.name, wanted.paths[0].display());
+        photo.ensure_maps_fit(&shown, &[&map], wanted.kind, params)?;
+        Ok(map)
+    };
+    wanted.iter().map(read).collect()
 }
 
 /// The names that maps go by, for messages.

@@ -12,6 +12,7 @@ mod lattice;
 mod maps;
 mod output;
 mod palette;
+mod regular;
 mod show;
 mod small;
 mod sources;
@@ -45,6 +46,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
         "extract" => extract::run(matches),
         "apply" => apply::run(matches),
         "lattice" => lattice::run(matches),
+        "regular" => regular::run(matches),
         "params" => small::params(matches),
         "info" => small::info(matches),
         "completions" => small::completions(matches),

@@ -16,6 +16,7 @@ use crate::image::picture::{Encoding, Picture};
 use crate::verb::extract::ExtractParams;
 use crate::verb::lattice::LatticeParams;
 use crate::verb::params::TileParams;
+use crate::verb::regular::RegularParams;
 
 /// Version of what `--json` writes; goes up when a field changes its meaning or goes away.
 pub(super) const SCHEMA_VERSION: u32 = 1;
@@ -27,6 +28,7 @@ type Schema = (&'static str, fn() -> Vec<Param>);
 pub(super) const SCHEMAS: &[Schema] = &[
     (TileParams::VERB, TileParams::schema),
     (LatticeParams::VERB, LatticeParams::schema),
+    (RegularParams::VERB, RegularParams::schema),
     (ExtractParams::VERB, ExtractParams::schema),
 ];
 

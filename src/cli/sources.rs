@@ -42,6 +42,13 @@ impl Sources {
         file("photo", "PHOTO", "The photo: PNG, JPEG, TIFF, WebP, EXR and others").required(true)
     }
 
+    /// Where the photo may be used.
+    pub(super) fn mask() -> Arg {
+        file("mask", "FILE", "Picture of the photo's size: usable is where its first channel is at least half of \
+             full scale and its alpha, if any, too; the photo's own transparent pixels are never used")
+            .long("mask")
+    }
+
     /// What else can be typed, for any command that makes tiles.
     pub(super) fn args() -> [Arg; 3] {
         [
@@ -49,9 +56,7 @@ impl Sources {
                  any size; may be repeated")
                 .long("also")
                 .action(ArgAction::Append),
-            file("mask", "FILE", "Picture of the photo's size: usable is where its first channel is at least half of \
-                 full scale and its alpha, if any, too; the photo's own transparent pixels are never used")
-                .long("mask"),
+            Self::mask(),
             file("avoid", "FILE", "Picture of the photo's size whose marks are never copied: where its first channel is \
                  at least half of full scale and its alpha, if any, too; --avoid-grow widens the marks")
                 .long("avoid"),

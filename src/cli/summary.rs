@@ -7,7 +7,7 @@ use std::time::Duration;
 use serde::{Serialize, Serializer};
 
 use crate::base::ctx::Ctx;
-use crate::base::params::Value as _;
+use crate::base::params::{Param, Value as _};
 use crate::cli::output::Target;
 use crate::cli::show::duration;
 use crate::cli::small::{SCHEMA_VERSION, typed};
@@ -66,11 +66,11 @@ struct Variant {
 }
 
 #[derive(Debug, Serialize)]
-struct Seconds {
+pub(super) struct Seconds {
     /// In the order of the work.
     #[serde(serialize_with = "in_order")]
-    stages: Vec<(&'static str, f64)>,
-    total: f64,
+    pub(super) stages: Vec<(&'static str, f64)>,
+    pub(super) total: f64,
 }
 
 /// Pairs as one JSON object that keeps their order.
@@ -101,26 +101,32 @@ impl Written {
 
 /// How the tile was made, for the file itself. Holds nothing that differs between equal runs.
 pub(super) fn record(report: &Report) -> String {
-    let mut record = serde_json::json!({
-        "tool": "texforge",
-        "version": report.version,
-        "verb": TileParams::VERB,
-        "seed": report.seed,
-        "params": params(report),
-    });
+    let Report { version, seed, .. } = report;
+    let params = typed_params(&TileParams::schema(), &report.params);
+    let mut record = record_of(TileParams::VERB, version, *seed, params);
     if let Some(rect) = report.redo {
         record["redo"] = serde_json::json!(rect);
     }
     record.to_string()
 }
 
-fn params(report: &Report) -> BTreeMap<&'static str, serde_json::Value> {
-    let schema = TileParams::schema();
+/// What every command records in its files.
+pub(super) fn record_of(verb: &str, version: &str, seed: u64, params: Typed) -> serde_json::Value {
+    serde_json::json!({
+        "tool": "texforge", "version": version, "verb": verb, "seed": seed, "params": params,
+    })
+}
+
+/// Parameters by name.
+pub(super) type Typed = BTreeMap<&'static str, serde_json::Value>;
+
+/// Parameters as numbers and words.
+pub(super) fn typed_params(schema: &[Param], params: &[(&'static str, String)]) -> Typed {
     let value = |name: &str, text: &str| match schema.iter().find(|p| p.name == name) {
         Some(param) => typed(param, text),
         None => text.into(),
     };
-    report.params.iter().map(|(name, text)| (*name, value(name, text))).collect()
+    params.iter().map(|(name, text)| (*name, value(name, text))).collect()
 }
 
 /// All of a run; `tiles` holds each tile's place and report.
@@ -153,7 +159,7 @@ pub(super) fn summary(
         version: report.version,
         seed: first.seed,
         threads: ctx.threads(),
-        params: params(report),
+        params: typed_params(&TileParams::schema(), &report.params),
         stationarity: report.stationarity,
         photo: photo((&photos[0], &report.photo_size)),
         also: photos[1..].iter().zip(&report.also_sizes).map(photo).collect(),

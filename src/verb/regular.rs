@@ -36,12 +36,6 @@ const BLOCK_PIXELS: f64 = 64.0;
 /// Border by itself, as a share of the block: up to a half gives the seams more room, and time.
 const BORDER_SHARE: f64 = 0.375;
 
-/// Pixels of a strip, about: what is held at a time when a large texture is made.
-const STRIP_PIXELS: usize = 1 << 24;
-
-/// Rows of blocks in a strip, at least: up to four more have to be looked at each time.
-const STRIP_BLOCKS: usize = 8;
-
 choice! {
     /// In which directions a near-regular texture repeats.
     pub enum Tileable {
@@ -373,49 +367,56 @@ impl<'a> RegularMaker<'a> {
     /// # Errors
     /// [`Error::Memory`], [`Error::BadPicture`] if no piece fits at some place, those of
     /// [`SourceMap::apply`], [`Error::Cancelled`].
-    pub fn make(self, ctx: &Ctx, maps: &[(&Picture, MapKind)]) -> Result<(Regular, Vec<Picture>)> {
-        let (width, height) = self.size();
-        let of = |map: &Picture| map.byte_len().div_ceil(map.height() * map.width()) as u64;
-        // Places and what they are mixed with, and the same as source maps; a picture, and its twin
-        // while they are mixed.
-        let maps_bytes = maps.iter().map(|(map, _)| of(map)).sum::<u64>();
-        let each = 40 + 3 * of(self.photo) + maps_bytes + 4 * PIECES;
-        let need = (width as u64 * height as u64).checked_mul(each);
-        ensure_available(&format!("a texture of {width}x{height}, as a whole,"), need)?;
+    pub fn make(&self, ctx: &Ctx, maps: &[(&Picture, MapKind)]) -> Result<(Regular, Vec<Picture>)> {
         let start = Instant::now();
-        let whole = self.divided(ctx, usize::MAX).next();
+        let maps_bytes = maps.iter().map(|(map, _)| bytes_per_pixel(map)).sum();
+        let whole = self.divided(ctx, usize::MAX, maps_bytes)?.next();
         let whole = whole.ok_or_else(|| Error::Internal { message: "no rows".into() })??;
         let (picture, maps) = ctx.install(|| {
             let maps = maps.iter().map(|(map, kind)| whole.picture(map, *kind));
             let maps = maps.collect::<Result<Vec<_>>>()?;
             Ok((whole.picture(self.photo(), MapKind::Color)?, maps))
         })?;
-        let mut report = self.report;
+        let mut report = self.report.clone();
         report.seconds.push(("synthesis", start.elapsed().as_secs_f64()));
         Ok((Regular { picture, source_map: whole.source_map, report }, maps))
     }
 
-    /// The texture from top to bottom, some rows at a time: the same pixels as
-    /// [`make`](Self::make), for textures larger than memory. Errors are those of it.
-    pub fn strips(&self, ctx: &Ctx) -> impl Iterator<Item = Result<RegularStrip>> + use<'_, 'a> {
-        let rows = (STRIP_PIXELS / (self.size().0 * self.plan.block)).max(STRIP_BLOCKS);
-        self.divided(ctx, rows)
+    /// The texture from top to bottom, about so many pixels at a time: the same ones as
+    /// [`make`](Self::make) gives, for textures larger than memory. Every strip looks at up to four
+    /// rows of blocks besides its own, so few make much more work.
+    ///
+    /// # Errors
+    /// [`Error::Memory`]; the strips' are as of [`make`](Self::make).
+    pub fn strips(
+        &self,
+        ctx: &Ctx,
+        pixels: usize,
+    ) -> Result<impl Iterator<Item = Result<RegularStrip>> + use<'_, 'a>> {
+        self.divided(ctx, (pixels / (self.size().0 * self.plan.block)).max(1), 0)
     }
 
-    /// The same, `rows` rows of blocks at a time.
+    /// The same, `rows` rows of blocks at a time; `more` bytes a pixel are held besides.
     fn divided(
         &self,
         ctx: &Ctx,
         rows: usize,
-    ) -> impl Iterator<Item = Result<RegularStrip>> + use<'_, 'a> {
+        more: u64,
+    ) -> Result<impl Iterator<Item = Result<RegularStrip>> + use<'_, 'a>> {
+        let (width, height) = self.size();
+        let tall = rows.saturating_mul(self.plan.block).min(height) + 4 * self.plan.block;
+        // Places and what they are mixed with; a picture, its twin and the mixture.
+        let each = 40 + PIECES + 3 * bytes_per_pixel(self.photo) + more;
+        let need = (width as u64).checked_mul(tall as u64).and_then(|n| n.checked_mul(each));
+        ensure_available(&format!("a texture of {width}x{height}, {tall} rows at a time,"), need)?;
         let mosaic = Mosaic::new(&self.exemplar, &self.plan);
         let all = mosaic.block_rows();
         let strips = (0..all).step_by(rows).map(move |i| i..i.saturating_add(rows).min(all));
         let strips: Vec<_> = strips.collect();
         ctx.begin(strips.iter().map(|strip| mosaic.work(strip.clone())).sum());
         let photo = (self.photo.height(), self.photo.width());
-        let (width, ctx) = (self.size().0, ctx.clone());
-        strips.into_iter().map(move |blocks| {
+        let ctx = ctx.clone();
+        Ok(strips.into_iter().map(move |blocks| {
             ctx.install(|| {
                 let rsgf::Strip { first, from, mixed } = mosaic.strip(&ctx, blocks)?;
                 let size = (from.len() / width, width);
@@ -428,13 +429,17 @@ impl<'a> RegularMaker<'a> {
                 };
                 Ok(RegularStrip { first, source_map, mixed })
             })
-        })
+        }))
     }
 }
 
-/// Bytes a pixel that filled gaps hold until they are painted: place and share, twice over as their
-/// windows overlap.
-const PIECES: u64 = 10;
+/// Bytes a pixel that filled gaps hold until they are painted: place and share, on windows up to twice as
+/// wide and high as their blocks.
+const PIECES: u64 = 24;
+
+fn bytes_per_pixel(picture: &Picture) -> u64 {
+    picture.byte_len().div_ceil(picture.height() * picture.width()) as u64
+}
 
 /// Where the photo may be used, by mask and alpha (`None`: everywhere); checked to hold something that
 /// is not all alike.

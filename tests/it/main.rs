@@ -12,6 +12,7 @@ mod measures;
 mod options;
 mod quality;
 mod redo;
+mod regular;
 mod search;
 #[path = "../support/mod.rs"]
 mod support;

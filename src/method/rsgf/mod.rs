@@ -209,10 +209,6 @@ impl<'a> Mosaic<'a> {
         Lenses { size: (height, width), border: self.plan.border.min(height / 2).min(width / 2) }
     }
 
-    fn rng(&self, ctx: &Ctx, stage: u32, [r, c]: Block) -> Rng {
-        Rng::new(ctx.seed, stage, 0, ((r as u64) << 32) | (c as u64 & 0xffff_ffff))
-    }
-
     /// The middle of a block.
     fn middle(&self, block: Block) -> (f64, f64) {
         let [y, x] = self.corner(block);
@@ -252,7 +248,7 @@ impl<'a> Mosaic<'a> {
     /// Random sampling (paper, sec. 4.1).
     fn sample(&self, ctx: &Ctx, block: Block) -> Result<Offset> {
         let own = self.own(block);
-        let mut rng = self.rng(ctx, SAMPLE_STAGE, own);
+        let mut rng = rng(ctx, SAMPLE_STAGE, own);
         let drawn = self.places.draw(&mut rng, self.middle(own), |o| self.fits(own, o, 0));
         drawn.map(|offset| self.moved(own, block, offset)).ok_or_else(|| self.nowhere(own))
     }
@@ -276,7 +272,7 @@ impl<'a> Mosaic<'a> {
             let [wy, wx] = corners[side as usize];
             image.pixel((wy + y as i64) as usize, (wx + x as i64) as usize)
         });
-        let mut rng = self.rng(ctx, GAP_STAGE, block);
+        let mut rng = rng(ctx, GAP_STAGE, block);
         let (candidates, bend) = (self.plan.candidates, self.plan.deform);
         let fits = |o: Offset| self.fits(block, o, bend);
         let places = self.places.several(&mut rng, self.middle(block), candidates, fits);
@@ -491,6 +487,11 @@ impl<'a> Mosaic<'a> {
         }
         Ok(())
     }
+}
+
+/// Random numbers for one block.
+fn rng(ctx: &Ctx, stage: u32, [r, c]: Block) -> Rng {
+    Rng::new(ctx.seed, stage, 0, ((r as u64) << 32) | (c as u64 & 0xffff_ffff))
 }
 
 /// The pixels of a rectangle, row by row.
