@@ -201,7 +201,7 @@ pub(super) fn write<W: Write + Seek>(
     }
 }
 
-/// As [`write`], as a TIFF or a `BigTIFF`.
+/// As [`write()`], as a TIFF or a `BigTIFF`.
 pub(super) fn write_kind<W: Write + Seek, K: TiffKind>(
     out: &mut Sink<'_, W>,
     frame: &Frame,
