@@ -1,7 +1,7 @@
 //! Where results go: files that appear all at once or not at all, or standard output.
 
-use std::fs::Permissions;
-use std::io::Write as _;
+use std::fs::{File, Permissions};
+use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
@@ -77,6 +77,19 @@ impl Staging {
     /// # Errors
     /// [`Error::Io`], [`Error::Cancelled`].
     pub(super) fn stage(&self, session: &Session, path: &Path, bytes: &[u8]) -> Result<()> {
+        self.stage_with(session, path, |out| out.write_all(bytes).map_err(Error::io("write", path)))
+    }
+
+    /// Puts what `write` writes under a temporary name beside `path`.
+    ///
+    /// # Errors
+    /// Those of `write`, [`Error::Io`], [`Error::Cancelled`].
+    pub(super) fn stage_with(
+        &self,
+        session: &Session,
+        path: &Path,
+        write: impl FnOnce(&mut Begun) -> Result<()>,
+    ) -> Result<()> {
         let refused = || Error::io("write", path);
         // Replacing what a symbolic link leads to keeps the link.
         let target = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
@@ -90,7 +103,7 @@ impl Staging {
             builder.permissions(permissions);
         }
         // Register the file before the long write, so that an interruption finds it.
-        let mut file = {
+        let file = {
             let mut state = self.lock();
             if state.closed {
                 return Err(Error::Cancelled);
@@ -99,10 +112,12 @@ impl Staging {
             state.waiting.push((name, target.clone()));
             file
         };
-        for chunk in bytes.chunks(CHUNK) {
-            session.check()?;
-            file.write_all(chunk).map_err(refused())?;
-        }
+        let mut begun = Begun { file, session };
+        let written = write(&mut begun);
+        // Whatever else a cancelled write says.
+        session.check()?;
+        written?;
+        let file = begun.file;
         if let Ok(old) = std::fs::metadata(&target) {
             file.set_permissions(old.permissions()).map_err(refused())?;
         }
@@ -156,6 +171,30 @@ impl Staging {
 
     fn lock(&self) -> std::sync::MutexGuard<'_, State> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// A file of [`Staging`] while it is written; once the user has asked to stop, writing fails.
+#[derive(Debug)]
+pub(super) struct Begun<'a> {
+    file: File,
+    session: &'a Session,
+}
+
+impl Write for Begun<'_> {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.session.check().map_err(std::io::Error::other)?;
+        self.file.write(&bytes[..bytes.len().min(CHUNK)])
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        self.file.flush()
+    }
+}
+
+impl Seek for Begun<'_> {
+    fn seek(&mut self, to: SeekFrom) -> std::io::Result<u64> {
+        self.file.seek(to)
     }
 }
 
@@ -228,6 +267,44 @@ mod tests {
         assert!(link.symlink_metadata().expect("link").is_symlink());
         assert_eq!(std::fs::read(&file).expect("file"), b"new");
         assert_eq!(file.metadata().expect("file").permissions().mode() & 0o777, 0o640);
+    }
+
+    #[test]
+    fn files_are_written_in_pieces_anywhere() {
+        let folder = tempfile::tempdir().expect("folder");
+        let session = Session::new(Arc::default(), true);
+        let a = folder.path().join("a");
+        let write = |out: &mut Begun| {
+            let mut pieces = || {
+                out.write_all(b"....")?;
+                out.write_all(&vec![7; CHUNK + 1])?;
+                out.seek(SeekFrom::Start(0))?;
+                out.write_all(b"head")
+            };
+            pieces().map_err(Error::io("write", &a))
+        };
+        session.staging.stage_with(&session, &a, write).expect("stage");
+        assert!(!a.exists());
+        session.staging.commit(&session, false).expect("commit");
+        let bytes = std::fs::read(&a).expect("a");
+        assert_eq!((&bytes[..5], bytes.len()), (&b"head\x07"[..], CHUNK + 5));
+    }
+
+    #[test]
+    fn a_cancelled_write_ends_and_says_so() {
+        let folder = tempfile::tempdir().expect("folder");
+        let session = Session::new(Arc::default(), true);
+        let a = folder.path().join("a");
+        let write = |out: &mut Begun| {
+            out.write_all(b"1").map_err(Error::io("write", &a))?;
+            session.job.cancel();
+            out.write_all(b"2").map_err(Error::io("write", &a))?;
+            panic!("written after the cancel");
+        };
+        let result = session.staging.stage_with(&session, &a, write);
+        assert!(matches!(result, Err(Error::Cancelled)), "{result:?}");
+        assert!(session.staging.abandon());
+        assert_eq!(names(folder.path()), [""; 0]);
     }
 
     #[test]

@@ -218,9 +218,9 @@ fn code_points_outrank_everything() {
 #[test]
 fn exr_channels_are_colors_or_data_by_their_names() {
     let plane = |v: f32| ::exr::image::FlatSamples::F32(vec![v, v + 10.0]);
-    let read = |names: &[(&str, f32)]| {
-        let channels = names.iter().map(|(name, v)| ((*name).to_owned(), plane(*v))).collect();
-        let bytes = exr::encode_planes((2, 1), channels, None, None).expect("encode");
+    let read = |names: &[(&'static str, f32)]| {
+        let channels = names.iter().map(|(name, v)| (*name, plane(*v)));
+        let bytes = tests::exr_of_planes(channels, None);
         read_bytes(&bytes, "a.exr", MapKind::Color).expect("read")
     };
     let color = read(&[("R", 1.0), ("G", 2.0), ("B", 3.0), ("Z", 9.0)]);

@@ -1,14 +1,21 @@
 //! `OpenEXR`, by the `exr` crate: half stays half, float stays float, values above 1 survive.
 
-use std::io::Cursor;
+use std::borrow::Cow;
+use std::io::{Cursor, Seek, Write};
 
-use exr::image::write::WritableImage;
-use exr::image::{AnyChannel, AnyChannels, Encoding as Packing, FlatSamples, Image, Layer};
-use exr::meta::attribute::{AttributeValue, LineOrder, Text};
-use exr::meta::header::{Header, LayerAttributes};
-use exr::prelude::{Blocks, Compression, ReadChannels, ReadLayers};
+use exr::block::writer::{ChunkWriter, ChunksWriter};
+use exr::block::{BlockIndex, UncompressedBlock};
+use exr::error::{Error as Fault, UnitResult};
+use exr::image::FlatSamples;
+use exr::io::Data;
+use exr::math::Vec2;
+use exr::meta::attribute::{AttributeValue, ChannelDescription, LineOrder, SampleType, Text};
+use exr::meta::header::{Header, ImageAttributes, LayerAttributes};
+use exr::meta::{BlockDescription, MetaData};
+use exr::prelude::{Compression, ReadChannels, ReadLayers};
 use half::f16;
 
+use super::rows::{Frame, Pieces, Sink};
 use super::{Raw, Source};
 use crate::base::error::{Error, Result};
 use crate::image::color::linear_from_srgb;
@@ -29,9 +36,9 @@ pub(super) struct Planes {
 
 /// Reads the first flat layer at its largest resolution.
 pub(super) fn read_planes(source: &Source) -> Result<Planes> {
-    let fault = |e: exr::error::Error| -> Error {
+    let fault = |e: Fault| -> Error {
         match e {
-            exr::error::Error::NotSupported(what) => source.unsupported(what),
+            Fault::NotSupported(what) => source.unsupported(what),
             e => source.damaged("EXR", e),
         }
     };
@@ -215,24 +222,33 @@ fn by_alpha(samples: &mut Samples, c: usize, mut f: impl FnMut(f64, f64) -> f64)
     });
 }
 
-/// Encodes any number of channels. Half and single floats keep their bits; doubles are rounded to
+/// Writes any number of channels. Half and single floats keep their bits; doubles are rounded to
 /// the nearest single float; integers become linear light (colors) or `v / full scale` (data) in
 /// single floats, from which the integers can be had back exactly. Colors are multiplied by alpha.
-pub(super) fn encode(picture: &Picture, record: Option<&str>) -> Result<Vec<u8>, String> {
-    if picture.meta.icc.is_some() && picture.encoding == Encoding::Srgb {
-        return Err("EXR cannot hold the color profile the samples are in; use .png or .tif".into());
+pub(super) fn write<W: Write + Seek>(
+    out: &mut Sink<'_, W>,
+    frame: &Frame,
+    pieces: &mut Pieces,
+) -> Result<()> {
+    if frame.pixel.meta.icc.is_some() && frame.pixel.encoding == Encoding::Srgb {
+        return Err(
+            frame.refused("EXR cannot hold the color profile the samples are in; use .png or .tif")
+        );
     }
-    let c = picture.channels();
-    let alpha = picture.alpha_channel();
-    let mut samples = match picture.samples() {
-        Samples::F16(_) | Samples::F32(_) => picture.samples().clone(),
-        Samples::F64(v) => Samples::F32(v.iter().map(|s| *s as f32).collect()),
-        Samples::U8(v) => Samples::F32(floats(v, c, picture.encoding, alpha)),
-        Samples::U16(v) => Samples::F32(floats(v, c, picture.encoding, alpha)),
-    };
-    if alpha.is_some() {
-        by_alpha(&mut samples, c, |color, alpha| color * alpha);
+    match frame.pixel.samples() {
+        Samples::F16(_) => write_floats::<f16>(out, frame, pieces, SampleType::F16),
+        _ => write_floats::<f32>(out, frame, pieces, SampleType::F32),
     }
+}
+
+fn write_floats<T: Sample + Data>(
+    out: impl Write + Seek,
+    frame: &Frame,
+    pieces: &mut Pieces,
+    kind: SampleType,
+) -> Result<()> {
+    let pixel = &frame.pixel;
+    let c = pixel.channels();
     let names: Vec<String> = match c {
         1 => vec!["Y".into()],
         2 => vec!["Y".into(), "A".into()],
@@ -240,14 +256,38 @@ pub(super) fn encode(picture: &Picture, record: Option<&str>) -> Result<Vec<u8>,
         4 => ["R", "G", "B", "A"].map(String::from).to_vec(),
         n => (0..n).map(|i| format!("C{i:04}")).collect(),
     };
-    let plane = |k: usize| match &samples {
-        Samples::F16(v) => FlatSamples::F16(v.iter().skip(k).step_by(c).copied().collect()),
-        Samples::F32(v) => FlatSamples::F32(v.iter().skip(k).step_by(c).copied().collect()),
-        _ => FlatSamples::F32(Vec::new()),
+    let density = pixel.meta.pixels_per_metre.map(|(x, _)| (f64::from(x) * 0.0254) as f32);
+    let mut result = Ok(());
+    let file = File {
+        size: (frame.width, frame.height),
+        channels: names.iter().map(|name| (name.as_str(), kind)).collect(),
+        density,
+        record: frame.record.as_deref(),
     };
-    let channels = names.into_iter().enumerate().map(|(k, name)| (name, plane(k))).collect();
-    let density = picture.meta.pixels_per_metre.map(|(x, _)| (f64::from(x) * 0.0254) as f32);
-    encode_planes((picture.width(), picture.height()), channels, density, record)
+    let written = file.write(out, |blocks| {
+        result = pieces.bands::<T>(
+            BLOCK,
+            |samples| stored(samples, pixel),
+            |band| blocks.push(|channel, i| band[i * c + channel]).map_err(|e| e.to_string()),
+        );
+        Ok(())
+    });
+    result.and(written.map_err(|e| frame.refused(e)))
+}
+
+/// Samples of a picture like `pixel` as the file holds them.
+fn stored<'a>(samples: &'a Samples, pixel: &Picture) -> Cow<'a, Samples> {
+    let (c, alpha) = (pixel.channels(), pixel.alpha_channel());
+    let mut stored = match samples {
+        Samples::F16(_) | Samples::F32(_) => Cow::Borrowed(samples),
+        Samples::F64(v) => Cow::Owned(Samples::F32(v.iter().map(|s| *s as f32).collect())),
+        Samples::U8(v) => Cow::Owned(Samples::F32(floats(v, c, pixel.encoding, alpha))),
+        Samples::U16(v) => Cow::Owned(Samples::F32(floats(v, c, pixel.encoding, alpha))),
+    };
+    if alpha.is_some() {
+        by_alpha(stored.to_mut(), c, |color, alpha| color * alpha);
+    }
+    stored
 }
 
 /// Integers as floats, each value looked up in a table made once.
@@ -270,33 +310,87 @@ fn floats<T: Sample + Into<usize>>(
     v.iter().enumerate().map(value).collect()
 }
 
-/// An EXR file of these channels, in blocks of ZIP. The record is its only attribute of ours: more
-/// than one would come out in random order.
-pub(super) fn encode_planes(
-    size: (usize, usize),
-    channels: Vec<(String, FlatSamples)>,
-    density: Option<f32>,
-    record: Option<&str>,
-) -> Result<Vec<u8>, String> {
-    let mut list = Vec::with_capacity(channels.len());
-    for (name, plane) in channels {
-        let name = Text::new_or_none(&name).ok_or("a channel name is not plain text")?;
-        list.push(AnyChannel::new(name, plane));
+const PACKING: Compression = Compression::ZIP16;
+/// Rows in a block.
+pub(super) const BLOCK: usize = PACKING.scan_lines_per_block();
+
+/// An EXR file, written block by block. The record is its only attribute of ours: more than one
+/// would come out in random order.
+pub(super) struct File<'a> {
+    /// Width and height.
+    pub(super) size: (usize, usize),
+    pub(super) channels: Vec<(&'a str, SampleType)>,
+    /// Pixels per inch.
+    pub(super) density: Option<f32>,
+    pub(super) record: Option<&'a str>,
+}
+
+impl File<'_> {
+    /// Writes the file; `fill` is to push all blocks.
+    pub(super) fn write<W: Write + Seek>(
+        &self,
+        out: W,
+        fill: impl FnOnce(&mut BlockWriter<'_, W>) -> UnitResult,
+    ) -> UnitResult {
+        let text = |text| {
+            Text::new_or_none(text)
+                .ok_or(Fault::Invalid("a name or the record is not plain text".into()))
+        };
+        // The format wants the channels in the order of their names.
+        let mut order: Vec<usize> = (0..self.channels.len()).collect();
+        order.sort_by_key(|&k| self.channels[k].0);
+        let describe = |&k: &usize| {
+            let (name, kind) = self.channels[k];
+            Ok(ChannelDescription::named(text(name)?, kind))
+        };
+        let channels = order.iter().map(describe).collect::<exr::error::Result<_>>()?;
+        let mut attributes = ImageAttributes::with_size(self.size);
+        if let Some(record) = self.record {
+            attributes.other.insert(Text::from("texforge"), AttributeValue::Text(text(record)?));
+        }
+        let own =
+            LayerAttributes { horizontal_density: self.density, ..LayerAttributes::default() };
+        let header = Header::new(Text::default(), self.size, channels)
+            .with_encoding(PACKING, BlockDescription::ScanLines, LineOrder::Increasing)
+            .with_attributes(own)
+            .with_shared_attributes(attributes);
+        exr::block::write(out, std::iter::once(header).collect(), true, |meta, chunks| {
+            fill(&mut BlockWriter { meta: &meta, chunks, order: &order, y: 0 })
+        })
     }
-    let packing = Packing {
-        compression: Compression::ZIP16,
-        blocks: Blocks::ScanLines,
-        line_order: LineOrder::Increasing,
-    };
-    let attributes = LayerAttributes { horizontal_density: density, ..LayerAttributes::default() };
-    let layer =
-        Layer::new(size, attributes, packing, AnyChannels::sort(list.into_iter().collect()));
-    let mut image = Image::from_layer(layer);
-    if let Some(record) = record {
-        let text = Text::new_or_none(record).ok_or("the record is not plain text")?;
-        image.attributes.other.insert(Text::from("texforge"), AttributeValue::Text(text));
+}
+
+/// Takes the rows of a [`File`] from the top.
+pub(super) struct BlockWriter<'a, W> {
+    meta: &'a MetaData,
+    chunks: &'a mut ChunkWriter<W>,
+    /// Our number of each channel of the file.
+    order: &'a [usize],
+    y: usize,
+}
+
+impl<W: Write + Seek> BlockWriter<'_, W> {
+    /// Writes the next [`BLOCK`] rows, or those that are left; `value` tells the sample of a channel
+    /// at a pixel, counted from the first of these rows.
+    pub(super) fn push<T: Data>(&mut self, value: impl Fn(usize, usize) -> T) -> UnitResult {
+        let header = &self.meta.headers[0];
+        let Vec2(width, height) = header.layer_size;
+        let y = self.y;
+        let index = BlockIndex {
+            layer: 0,
+            pixel_position: Vec2(0, y),
+            pixel_size: Vec2(width, BLOCK.min(height - y)),
+            level: Vec2(0, 0),
+        };
+        let mut lines = Ok(());
+        let block = UncompressedBlock::from_lines(&header.channels, index, |line| {
+            let channel = self.order[line.location.channel];
+            let start = (line.location.position.1 - y) * width;
+            let written = line.write_samples(|x| value(channel, start + x));
+            lines = std::mem::replace(&mut lines, Ok(())).and(written);
+        });
+        lines?;
+        self.y += BLOCK;
+        self.chunks.sequential_blocks_compressor(self.meta).compress_block(y / BLOCK, block)
     }
-    let mut out = Cursor::new(Vec::new());
-    image.write().non_parallel().to_buffered(&mut out).map_err(|e| e.to_string())?;
-    Ok(out.into_inner())
 }

@@ -3,7 +3,7 @@
 //! [`read`] decides the format by content, keeps the samples in their own type, and brings colours
 //! to sRGB (integers) or linear light (floats); what it changed stands in `meta.notes`. [`write`]
 //! puts a picture where it belongs at once or not at all; what a format cannot hold is refused,
-//! never rounded away. Neither writes time stamps: same picture, same bytes.
+//! never rounded away. [`write_rows`] does so for pictures larger than memory. None writes time stamps: same picture, same bytes.
 
 mod exif;
 mod exr;
@@ -13,6 +13,7 @@ mod other;
 mod place;
 mod png;
 mod record;
+mod rows;
 mod source_map;
 mod tiff;
 mod write;
@@ -27,6 +28,7 @@ use crate::image::picture::{Encoding, Meta, Picture, Samples};
 
 pub use place::check_output;
 pub use record::read_record;
+pub use rows::write_rows;
 pub use source_map::{encode_source_map, read_source_map, write_source_map};
 pub use write::{WriteOptions, encode, write};
 
@@ -74,6 +76,11 @@ impl Format {
             "pgm" | "ppm" | "pnm" | "pam" => Self::Pnm,
             _ => return None,
         })
+    }
+
+    /// Whether it can be written a few rows at a time ([`write_rows`]).
+    pub fn streams(self) -> bool {
+        matches!(self, Self::Png | Self::Tiff | Self::Exr)
     }
 
     /// The format of a file that begins with these bytes. TGA has no signature: it is what the
@@ -315,5 +322,7 @@ fn unnamed() -> PathBuf {
 
 #[cfg(test)]
 mod color_tests;
+#[cfg(test)]
+mod rows_tests;
 #[cfg(test)]
 mod tests;

@@ -1,8 +1,10 @@
 //! A [`SourceMap`] as a file, to be replayed on a map that comes later.
 
+use std::io::Cursor;
 use std::path::Path;
 
 use exr::image::FlatSamples;
+use exr::meta::attribute::SampleType;
 use serde::{Deserialize, Serialize};
 
 use super::place::put;
@@ -62,17 +64,29 @@ pub fn encode_source_map(map: &SourceMap, path: &Path) -> Result<Vec<u8>> {
     let further = map.source_sizes()[1..].iter().map(|&(h, w)| (w, h)).collect();
     let header = Header { version, width, height, further };
     let header = serde_json::to_string(&header).map_err(|e| internal(e.to_string()))?;
-    let plane = |name: &str, values: Vec<u32>| (name.to_owned(), FlatSamples::U32(values));
-    let position = |k: usize| map.positions().iter().map(|p| p[k]).collect();
-    let mut channels = Vec::new();
-    if let Some(origins) = map.origins() {
-        channels.push(plane(CHANNELS[0], origins.iter().map(|o| o.photo.into()).collect()));
-        let codes = origins.iter().map(|o| o.symmetry.code().into());
-        channels.push(plane(CHANNELS[1], codes.collect()));
-    }
-    channels.extend([plane(CHANNELS[2], position(1)), plane(CHANNELS[3], position(0))]);
-    planes::encode_planes((map.width(), map.height()), channels, None, Some(&header))
-        .map_err(internal)
+    let first = if map.origins().is_some() { 0 } else { 2 };
+    let file = planes::File {
+        size: (map.width(), map.height()),
+        channels: CHANNELS[first..].iter().map(|name| (*name, SampleType::U32)).collect(),
+        density: None,
+        record: Some(&header),
+    };
+    let origin = |i: usize| map.origins().map(|origins| origins[i]).unwrap_or_default();
+    let mut out = Cursor::new(Vec::new());
+    let written = file.write(&mut out, |blocks| {
+        for y in (0..map.height()).step_by(planes::BLOCK) {
+            let start = y * map.width();
+            blocks.push(|channel, i| match first + channel {
+                0 => origin(start + i).photo.into(),
+                1 => origin(start + i).symmetry.code().into(),
+                2 => map.positions()[start + i][1],
+                _ => map.positions()[start + i][0],
+            })?;
+        }
+        Ok(())
+    });
+    written.map_err(|e| internal(e.to_string()))?;
+    Ok(out.into_inner())
 }
 
 /// Reads what [`write_source_map`] wrote.
@@ -144,6 +158,7 @@ fn decode(source: &Source) -> Result<SourceMap> {
 mod tests {
     use super::*;
     use crate::base::error::ErrorKind;
+    use crate::image::io::tests::exr_of_planes;
     use proptest::prelude::*;
 
     proptest! {
@@ -187,14 +202,13 @@ mod tests {
         let x = || FlatSamples::U32(vec![3, 0]);
         let y = || FlatSamples::U32(vec![2, 0]);
         let good = r#"{"source_map":1,"source_width":4,"source_height":3}"#;
-        let refuse = |channels: [(&str, FlatSamples); 2], header: Option<&str>, why: &str| {
-            let channels = channels.map(|(name, plane)| (name.to_owned(), plane)).to_vec();
-            let bytes = planes::encode_planes((2, 1), channels, None, header).expect("encode");
-            put(&path, &bytes, true).expect("write");
-            let error = read_source_map(&path).expect_err(why);
-            assert_eq!(error.kind(), ErrorKind::Decode, "{error}");
-            assert!(error.to_string().contains(why), "{error}");
-        };
+        let refuse =
+            |channels: [(&'static str, FlatSamples); 2], header: Option<&str>, why: &str| {
+                put(&path, &exr_of_planes(channels, header), true).expect("write");
+                let error = read_source_map(&path).expect_err(why);
+                assert_eq!(error.kind(), ErrorKind::Decode, "{error}");
+                assert!(error.to_string().contains(why), "{error}");
+            };
         refuse([("source.x", x()), ("source.y", y())], None, "header is missing");
         refuse([("source.x", x()), ("source.y", y())], Some("{}"), "does not say so");
         let newer = good.replace("map\":1", "map\":3");
@@ -210,15 +224,10 @@ mod tests {
         for (photo, symmetry, why) in
             [(1, 0, "photo 2 of 1"), (0, 8, "symmetry"), (70_000, 0, "symmetry")]
         {
-            let plane = |name: &str, values| (name.to_owned(), FlatSamples::U32(values));
-            let channels = vec![
-                plane("source.photo", vec![0, photo]),
-                plane("source.symmetry", vec![0, symmetry]),
-                plane("source.x", vec![3, 0]),
-                plane("source.y", vec![2, 0]),
-            ];
-            let bytes = planes::encode_planes((2, 1), channels, None, Some(&views)).expect("EXR");
-            put(&path, &bytes, true).expect("write");
+            let values = [[0, photo], [0, symmetry], [3, 0], [2, 0]];
+            let planes = values.map(|values| FlatSamples::U32(values.to_vec()));
+            put(&path, &exr_of_planes(CHANNELS.into_iter().zip(planes), Some(&views)), true)
+                .expect("write");
             let error = read_source_map(&path).expect_err(why);
             assert!(error.to_string().contains(why), "{error}");
         }

@@ -1,5 +1,10 @@
 //! Round trips of every format against what it is documented to keep, and hostile files.
 
+use ::exr::image::write::WritableImage;
+use ::exr::image::{AnyChannel, AnyChannels, Encoding as Packing, FlatSamples, Image, Layer};
+use ::exr::meta::attribute::{AttributeValue, LineOrder};
+use ::exr::meta::header::LayerAttributes;
+use ::exr::prelude::{Blocks, Compression};
 use half::f16;
 use proptest::prelude::*;
 
@@ -25,7 +30,11 @@ fn lossless() -> impl Iterator<Item = (Format, &'static str)> {
 }
 
 /// A picture of this type with well mixed values of `0..=1`, alpha 0 or 1.
-fn picture<T: Sample>((h, w, c): (usize, usize, usize), encoding: Encoding, seed: u64) -> Picture {
+pub(super) fn picture<T: Sample>(
+    (h, w, c): (usize, usize, usize),
+    encoding: Encoding,
+    seed: u64,
+) -> Picture {
     let value = |i: usize| {
         let mixed = (i as u64 + 1 + seed).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 40;
         let value = mixed as f64 / f64::from(1 << 24);
@@ -36,7 +45,7 @@ fn picture<T: Sample>((h, w, c): (usize, usize, usize), encoding: Encoding, seed
     Picture::new(h, w, c, samples, encoding).expect("picture")
 }
 
-fn all_types(size: (usize, usize, usize), color: bool, seed: u64) -> [Picture; 5] {
+pub(super) fn all_types(size: (usize, usize, usize), color: bool, seed: u64) -> [Picture; 5] {
     let (int, float) =
         if color { (Encoding::Srgb, Encoding::Linear) } else { (Encoding::Data, Encoding::Data) };
     [
@@ -46,6 +55,40 @@ fn all_types(size: (usize, usize, usize), color: bool, seed: u64) -> [Picture; 5
         picture::<f32>(size, float, seed),
         picture::<f64>(size, float, seed),
     ]
+}
+
+/// An EXR file of two pixels by the crate's own writer of whole images.
+pub(super) fn exr_of_planes(
+    channels: impl IntoIterator<Item = (&'static str, FlatSamples)>,
+    record: Option<&str>,
+) -> Vec<u8> {
+    let channels = channels.into_iter().map(|(name, plane)| AnyChannel::new(name, plane));
+    let packing = Packing {
+        compression: Compression::ZIP16,
+        blocks: Blocks::ScanLines,
+        line_order: LineOrder::Increasing,
+    };
+    let channels = AnyChannels::sort(channels.collect());
+    let mut image =
+        Image::from_layer(Layer::new((2, 1), LayerAttributes::default(), packing, channels));
+    if let Some(record) = record {
+        let text = AttributeValue::Text(record.into());
+        image.attributes.other.insert("texforge".into(), text);
+    }
+    let mut out = std::io::Cursor::new(Vec::new());
+    image.write().non_parallel().to_buffered(&mut out).expect("EXR");
+    out.into_inner()
+}
+
+#[test]
+fn exr_files_are_those_of_the_crate_s_own_writer() {
+    let samples = Samples::F32(vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+    let picture = Picture::new(1, 2, 3, samples, Encoding::Linear).expect("picture");
+    let options = WriteOptions { record: Some("{}".into()), ..WriteOptions::new(MapKind::Color) };
+    let plane = |a, b| FlatSamples::F32(vec![a, b]);
+    let planes = [("R", plane(1.0, 4.0)), ("G", plane(2.0, 5.0)), ("B", plane(3.0, 6.0))];
+    let bytes = encode(&picture, Format::Exr, &options).expect("exr");
+    assert!(bytes == exr_of_planes(planes, Some("{}")));
 }
 
 fn units(picture: &Picture) -> Vec<f64> {

@@ -1,20 +1,25 @@
 //! TIFF, by the `tiff` crate: integers of 8 and 16 bits, floats, palettes, any number of channels.
 
-use std::io::Cursor;
+use std::borrow::Cow;
+use std::io::{Cursor, Seek, Write};
 
-use tiff::ColorType;
-use tiff::TiffError;
+use bytemuck::NoUninit;
+use flate2::Compression;
+use flate2::write::ZlibEncoder;
 use tiff::decoder::{Decoder, DecodingResult, Limits};
-use tiff::encoder::colortype::{
-    Gray8, Gray16, Gray32Float, Gray64Float, RGB8, RGB16, RGB32Float, RGB64Float,
+use tiff::encoder::{
+    DirectoryEncoder, Predictor, Rational, TiffEncoder, TiffKind, TiffKindBig, TiffKindStandard,
 };
-use tiff::encoder::{Compression, DeflateLevel, Rational, TiffEncoder, TiffValue, colortype};
-use tiff::tags::{ExtraSamples, ResolutionUnit, Tag};
+use tiff::tags::{
+    CompressionMethod, ExtraSamples, PhotometricInterpretation, ResolutionUnit, SampleFormat, Tag,
+};
+use tiff::{ColorType, TiffError, TiffResult};
 
+use super::rows::{Frame, Pieces, Sink};
 use super::{Raw, Source, exif};
 use crate::base::error::{Error, Result};
 use crate::image::material::MapKind;
-use crate::image::picture::{Encoding, Picture, Samples};
+use crate::image::picture::{Encoding, Sample, Samples};
 
 pub(super) fn decode(source: &Source) -> Result<Raw> {
     let fault = |e: TiffError| -> Error {
@@ -162,7 +167,6 @@ fn rgb_from_cmyk(v: &[u8]) -> Vec<u8> {
 
 /// Divides colors by alpha, as our pictures have it straight.
 fn unassociate(raw: &mut Raw) {
-    use crate::image::picture::Sample;
     let c = raw.channels;
     crate::with_samples!(&mut raw.samples, v => for p in v.chunks_exact_mut(c) {
         let alpha = p[c - 1].to_unit();
@@ -175,81 +179,135 @@ fn unassociate(raw: &mut Raw) {
     raw.notes.push("the colors were stored multiplied by alpha and have been divided by it".into());
 }
 
-/// Encodes every sample type (half floats as single) with 1 to 4 channels.
-pub(super) fn encode(picture: &Picture, record: Option<&str>) -> Result<Vec<u8>, String> {
-    let singles;
-    match picture.samples() {
-        Samples::U8(v) => save::<Gray8, RGB8>(picture, v, record),
-        Samples::U16(v) => save::<Gray16, RGB16>(picture, v, record),
-        Samples::F16(v) => {
-            singles = v.iter().map(|s| s.to_f32()).collect::<Vec<f32>>();
-            save::<Gray32Float, RGB32Float>(picture, &singles, record)
+/// Bytes of gray or color samples in a strip, rounded up to whole rows.
+const STRIP: usize = 1_000_000;
+
+/// From this many bytes of samples on the file is a `BigTIFF`, as its size might not fit into 32 bits:
+/// what cannot be compressed becomes a little longer, and profile and record come on top.
+const BIG: u64 = (1 << 32) - (1 << 26);
+
+/// Writes every sample type (half floats as single) with 1 to 4 channels, in strips.
+pub(super) fn write<W: Write + Seek>(
+    out: &mut Sink<'_, W>,
+    frame: &Frame,
+    pieces: &mut Pieces,
+) -> Result<()> {
+    let bits = bits_per_sample(frame.pixel.samples());
+    let size = frame.height as u64 * frame.row_len() as u64 * u64::from(bits / 8);
+    if size < BIG {
+        write_kind::<W, TiffKindStandard>(out, frame, pieces)
+    } else {
+        write_kind::<W, TiffKindBig>(out, frame, pieces)
+    }
+}
+
+/// As [`write()`], as a TIFF or a `BigTIFF`.
+pub(super) fn write_kind<W: Write + Seek, K: TiffKind>(
+    out: &mut Sink<'_, W>,
+    frame: &Frame,
+    pieces: &mut Pieces,
+) -> Result<()> {
+    match frame.pixel.samples() {
+        Samples::U8(_) => write_strips::<u8, K>(out, frame, pieces),
+        Samples::U16(_) => write_strips::<u16, K>(out, frame, pieces),
+        Samples::F16(_) | Samples::F32(_) => write_strips::<f32, K>(out, frame, pieces),
+        Samples::F64(_) => write_strips::<f64, K>(out, frame, pieces),
+    }
+}
+
+fn bits_per_sample(samples: &Samples) -> u16 {
+    8 * stored(samples).bytes_per_sample() as u16
+}
+
+/// Samples as the file holds them.
+fn stored(samples: &Samples) -> Cow<'_, Samples> {
+    match samples {
+        Samples::F16(v) => Cow::Owned(Samples::F32(v.iter().map(|s| s.to_f32()).collect())),
+        other => Cow::Borrowed(other),
+    }
+}
+
+fn write_strips<T: Sample + NoUninit, K: TiffKind>(
+    out: impl Write + Seek,
+    frame: &Frame,
+    pieces: &mut Pieces,
+) -> Result<()> {
+    let pixel = &frame.pixel;
+    let float = pixel.samples().is_float();
+    if pixel.encoding == Encoding::Linear && !float {
+        let reason = "TIFF cannot say that its integers are linear; use .png or .exr";
+        return Err(frame.refused(reason));
+    }
+    let n = pixel.channels();
+    if n > 4 {
+        let reason = format!("TIFF is written with 1 to 4 channels, not {n}; use .exr");
+        return Err(frame.refused(reason));
+    }
+    let failed = |e: TiffError| frame.refused(e);
+    let mut encoder = TiffEncoder::<_, K>::new_generic(out).map_err(failed)?;
+    // Strips are compressed here: the crate's own encoder of images compresses whole ones only.
+    let mut directory = encoder.image_directory().map_err(failed)?;
+    let colors = if n < 3 { 1 } else { 3 };
+    let rows = STRIP.div_ceil(frame.width * colors * size_of::<T>());
+    write_tags(&mut directory, frame, rows).map_err(failed)?;
+
+    let (mut offsets, mut counts) = (Vec::new(), Vec::new());
+    pieces.bands::<T>(rows, stored, |strip| {
+        let mut packed = ZlibEncoder::new(Vec::new(), Compression::default());
+        packed.write_all(bytemuck::cast_slice(strip)).map_err(|e| e.to_string())?;
+        let packed = packed.finish().map_err(|e| e.to_string())?;
+        let at = directory.write_data(&packed[..]).map_err(|e| e.to_string())?;
+        offsets.push(K::convert_offset(at).map_err(|e| e.to_string())?);
+        counts.push(K::convert_offset(packed.len() as u64).map_err(|e| e.to_string())?);
+        Ok(())
+    })?;
+    let bits = bits_per_sample(pixel.samples());
+    let format = if float { SampleFormat::IEEEFP } else { SampleFormat::Uint };
+    directory.write_tag(Tag::BitsPerSample, &vec![bits; n][..]).map_err(failed)?;
+    directory.write_tag(Tag::SampleFormat, &vec![format.to_u16(); n][..]).map_err(failed)?;
+    directory.write_tag(Tag::StripOffsets, K::convert_slice(&offsets)).map_err(failed)?;
+    directory.write_tag(Tag::StripByteCounts, K::convert_slice(&counts)).map_err(failed)?;
+    directory.finish().map_err(failed)
+}
+
+/// All that is known before the strips.
+fn write_tags<W: Write + Seek, K: TiffKind>(
+    directory: &mut DirectoryEncoder<'_, W, K>,
+    frame: &Frame,
+    rows_per_strip: usize,
+) -> TiffResult<()> {
+    let pixel = &frame.pixel;
+    let n = pixel.channels();
+    let color =
+        if n < 3 { PhotometricInterpretation::BlackIsZero } else { PhotometricInterpretation::RGB };
+    let (unit, x, y) = match pixel.meta.pixels_per_metre {
+        Some((x, y)) => {
+            (ResolutionUnit::Centimeter, Rational { n: x, d: 100 }, Rational { n: y, d: 100 })
         }
-        Samples::F32(v) => save::<Gray32Float, RGB32Float>(picture, v, record),
-        Samples::F64(v) => save::<Gray64Float, RGB64Float>(picture, v, record),
-    }
-}
-
-fn save<Gray, Rgb>(
-    picture: &Picture,
-    samples: &[Gray::Inner],
-    record: Option<&str>,
-) -> Result<Vec<u8>, String>
-where
-    Gray: colortype::ColorType,
-    Rgb: colortype::ColorType<Inner = Gray::Inner>,
-    [Gray::Inner]: TiffValue,
-{
-    if picture.encoding == Encoding::Linear && !picture.samples().is_float() {
-        return Err("TIFF cannot say that its integers are linear; use .png or .exr".into());
-    }
-    let channels = picture.channels();
-    // Data of 2 or 4 channels too: readers drop extra samples that are not called alpha.
-    let alpha = match channels {
-        1 | 3 => None,
-        2 | 4 => Some(ExtraSamples::UnassociatedAlpha),
-        _ => return Err(format!("TIFF is written with 1 to 4 channels, not {channels}; use .exr")),
+        None => (ResolutionUnit::None, Rational { n: 1, d: 1 }, Rational { n: 1, d: 1 }),
     };
-    let write = if channels < 3 { write_as::<Gray> } else { write_as::<Rgb> };
-    write(picture, samples, alpha, record).map_err(|e| e.to_string())
-}
-
-fn write_as<C: colortype::ColorType>(
-    picture: &Picture,
-    samples: &[C::Inner],
-    alpha: Option<ExtraSamples>,
-    record: Option<&str>,
-) -> Result<Vec<u8>, TiffError>
-where
-    [C::Inner]: TiffValue,
-{
-    let mut out = Cursor::new(Vec::new());
-    let mut encoder =
-        TiffEncoder::new(&mut out)?.with_compression(Compression::Deflate(DeflateLevel::Balanced));
-    let mut image = encoder.new_image::<C>(picture.width() as u32, picture.height() as u32)?;
-    if let Some(alpha) = alpha {
-        image.extra_samples(&[alpha])?;
-        // The count of samples does not follow from the color type any more.
-        let bits = C::BITS_PER_SAMPLE[0];
-        let format = C::SAMPLE_FORMAT[0].to_u16();
-        let n = picture.channels();
-        image.encoder().write_tag(Tag::BitsPerSample, &vec![bits; n][..])?;
-        image.encoder().write_tag(Tag::SampleFormat, &vec![format; n][..])?;
-        image.encoder().write_tag(Tag::SamplesPerPixel, n as u16)?;
+    directory.write_tag(Tag::ImageWidth, frame.width as u32)?;
+    directory.write_tag(Tag::ImageLength, frame.height as u32)?;
+    directory.write_tag(Tag::Compression, CompressionMethod::Deflate.to_u16())?;
+    directory.write_tag(Tag::Predictor, Predictor::None.to_u16())?;
+    directory.write_tag(Tag::PhotometricInterpretation, color.to_u16())?;
+    directory.write_tag(Tag::RowsPerStrip, rows_per_strip as u32)?;
+    directory.write_tag(Tag::SamplesPerPixel, n as u16)?;
+    directory.write_tag(Tag::XResolution, x)?;
+    directory.write_tag(Tag::YResolution, y)?;
+    directory.write_tag(Tag::ResolutionUnit, unit.to_u16())?;
+    if n.is_multiple_of(2) {
+        // Data of 2 or 4 channels too: readers drop extra samples that are not called alpha.
+        let alpha = ExtraSamples::UnassociatedAlpha.to_u16();
+        directory.write_tag(Tag::ExtraSamples, &[alpha][..])?;
     }
-    if let Some((x, y)) = picture.meta.pixels_per_metre {
-        image.resolution_unit(ResolutionUnit::Centimeter);
-        image.x_resolution(Rational { n: x, d: 100 });
-        image.y_resolution(Rational { n: y, d: 100 });
+    if let Some(record) = &frame.record {
+        directory.write_tag(Tag::Software, format!("texforge {record}").as_str())?;
     }
-    if let Some(record) = record {
-        image.encoder().write_tag(Tag::Software, format!("texforge {record}").as_str())?;
-    }
-    if let Some(profile) = &picture.meta.icc
-        && picture.encoding != Encoding::Data
+    if let Some(profile) = &pixel.meta.icc
+        && pixel.encoding != Encoding::Data
     {
-        image.encoder().write_tag(Tag::IccProfile, profile.as_slice())?;
+        directory.write_tag(Tag::IccProfile, profile.as_slice())?;
     }
-    image.write_data(samples)?;
-    Ok(out.into_inner())
+    Ok(())
 }

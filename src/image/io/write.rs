@@ -1,14 +1,16 @@
 //! [`write`] and [`encode`]: a picture becomes a file, or is refused with a reason.
 
 use std::borrow::Cow;
+use std::io::Cursor;
+use std::iter::once;
 use std::path::Path;
 
 use super::place::{known_extension, put};
-use super::{Format, exr, jpeg, other, png, tiff, unnamed};
+use super::rows::write_as;
+use super::{Format, jpeg, other, unnamed};
 use crate::base::error::{Error, Result};
-use crate::image::color::srgb_from_linear;
 use crate::image::material::MapKind;
-use crate::image::picture::{Encoding, Picture, Sample, Samples};
+use crate::image::picture::{Encoding, Picture};
 
 /// How a picture is written.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -61,54 +63,30 @@ fn encode_for(
     format: Format,
     options: &WriteOptions,
 ) -> Result<Vec<u8>> {
+    if format.streams() {
+        let mut out = Cursor::new(Vec::with_capacity(picture.byte_len() / 2));
+        let rows = once(Ok(Cow::Borrowed(picture)));
+        write_as(&mut out, (path, format), picture.height(), rows, options)?;
+        return Ok(out.into_inner());
+    }
     let mut picture = Cow::Borrowed(picture);
     if options.kind != MapKind::Color && picture.encoding != Encoding::Data {
         picture.to_mut().encoding = Encoding::Data;
     }
-    let record = options.record.as_deref().map(plain_line);
-    let record = record.as_deref();
     let result = match format {
-        Format::Png if picture.samples().is_float() => {
-            sixteen_bits(&picture).and_then(|picture| png::encode(&picture, record))
+        Format::Jpeg => {
+            let record = options.record.as_deref().map(plain_line);
+            jpeg::encode(&picture, record.as_deref())
         }
-        Format::Png => png::encode(&picture, record),
-        Format::Jpeg => jpeg::encode(&picture, record),
-        Format::Tiff => tiff::encode(&picture, record),
-        Format::Exr => exr::encode(&picture, record),
-        Format::WebP | Format::Bmp | Format::Tga => other::encode(&picture, format),
         Format::Pnm => other::encode_pnm(&picture),
         Format::Gif => Err("GIF is not written; use .png".into()),
+        _ => other::encode(&picture, format),
     };
     result.map_err(|reason| Error::Format { path: path.to_owned(), reason })
 }
 
-/// A float picture as 16 bits, if nothing but rounding is lost: linear light gets the sRGB curve.
-fn sixteen_bits(picture: &Picture) -> Result<Picture, String> {
-    let (n, c) = (picture.samples().len(), picture.channels());
-    let alpha = picture.alpha_channel();
-    let curved = picture.encoding == Encoding::Linear;
-    let mut out = Vec::with_capacity(n);
-    for i in 0..n {
-        let value = picture.samples().unit(i);
-        if !(0.0..=1.0).contains(&value) {
-            return Err(format!(
-                "a sample is {value}, this format holds 0 to 1 only; use .exr or .tif to keep it"
-            ));
-        }
-        let curved = curved && alpha != Some(i % c);
-        out.push(u16::from_unit(if curved { srgb_from_linear(value) } else { value }));
-    }
-    let mut wide = picture
-        .with_samples(picture.height(), picture.width(), c, Samples::U16(out))
-        .map_err(|e| e.to_string())?;
-    if curved {
-        wide.encoding = Encoding::Srgb;
-    }
-    Ok(wide)
-}
-
 /// One line of ASCII: JSON's own escapes for everything else.
-fn plain_line(record: &str) -> String {
+pub(super) fn plain_line(record: &str) -> String {
     let mut line = String::with_capacity(record.len());
     for c in record.chars() {
         match c {
