@@ -204,7 +204,10 @@ mod pixels {
             if soft.seam == Seam::Graph {
                 let pairs = made.source_map.positions().iter().zip(sharp.source_map.positions());
                 let other = pairs.filter(|(a, b)| a != b).count();
-                assert!(other < 2_000, "the cut is only smoothed, yet {other} pixels changed sides");
+                assert!(
+                    other < 2_000,
+                    "the cut is only smoothed, yet {other} pixels changed sides"
+                );
             }
         }
     }
