@@ -266,7 +266,7 @@ fn write(
 fn record(made: &Extraction, i: usize) -> String {
     let (report, tile) = (&made.report, &made.tiles[i]);
     let params = typed_params(&ExtractParams::schema(), &report.params);
-    let mut record = record_of(ExtractParams::VERB, report.version, report.seed, params);
+    let mut record = record_of(ExtractParams::VERB, report.version, report.seed, &params);
     record["period"] = json!(report.period.sides);
     record["scale"] = json!(report.scale);
     record["photo_place"] = json!(tile.photo_place);

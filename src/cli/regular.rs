@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc;
+use std::time::Instant;
 
 use clap::{ArgMatches, Command};
 use serde::Serialize;
@@ -190,10 +191,10 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Str
         RegularParams::VERB,
         report.version,
         report.seed,
-        typed_params(&RegularParams::schema(), &report.params),
+        &typed_params(&RegularParams::schema(), &report.params),
     )
     .to_string();
-    let before = session.console.elapsed();
+    let start = Instant::now();
     let (width, height) = maker.size();
     let mut outputs = Vec::new();
     for (wanted, of) in request.maps.iter().zip(&maps) {
@@ -235,7 +236,7 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Str
         }
     }
     session.staging.commit(session, request.force)?;
-    report.seconds.push(("synthesis", (session.console.elapsed() - before).as_secs_f64()));
+    report.seconds.push(("synthesis", start.elapsed().as_secs_f64()));
     for file in files.iter().filter(|f| f.role != "texture") {
         session.console.say(&format!("{}  {width}x{height} ({})", file.path, file.what()));
     }

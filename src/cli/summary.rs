@@ -103,7 +103,7 @@ impl Written {
 pub(super) fn record(report: &Report) -> String {
     let Report { version, seed, .. } = report;
     let params = typed_params(&TileParams::schema(), &report.params);
-    let mut record = record_of(TileParams::VERB, version, *seed, params);
+    let mut record = record_of(TileParams::VERB, version, *seed, &params);
     if let Some(rect) = report.redo {
         record["redo"] = serde_json::json!(rect);
     }
@@ -111,7 +111,7 @@ pub(super) fn record(report: &Report) -> String {
 }
 
 /// What every command records in its files.
-pub(super) fn record_of(verb: &str, version: &str, seed: u64, params: Typed) -> serde_json::Value {
+pub(super) fn record_of(verb: &str, version: &str, seed: u64, params: &Typed) -> serde_json::Value {
     serde_json::json!({
         "tool": "texforge", "version": version, "verb": verb, "seed": seed, "params": params,
     })

@@ -449,7 +449,7 @@ mod program {
             (&["grey.png", "-o", "a.png"][..], 1, "alike"),
             (&["wall.png", "-o", "a.png", "--lattice", "1,2,3"][..], 2, "X1,Y1,X2,Y2"),
             (&["wall.png", "-o", "a.png", "--lattice", "-3,2,6,-4"][..], 2, "parallel"),
-            (&["wall.png", "-o", "wall.png"][..], 2, "also an input"),
+            (&["wall.png", "-o", "wall.png"][..], 1, "also an input"),
             (
                 &["wall.png", "-o", "a.png", "--block", "999", "--lattice", LATTICE][..],
                 1,

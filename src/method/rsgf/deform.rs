@@ -10,8 +10,8 @@ const SPACING: usize = 8;
 
 /// What a displacement by a pixel costs, and one that differs by a pixel from the next point's: squared
 /// codes a pixel compared. Less follows noise.
-const COST: f64 = 2.0;
-const BEND: f64 = 8.0;
+const COST: f64 = 6.0;
+const BEND: f64 = 32.0;
 
 /// A displacement: rows, columns.
 type Shift = [i32; 2];
@@ -135,4 +135,81 @@ fn along_side(
         at = from[at];
     }
     shifts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::rng::Rng;
+
+    /// Noise, and what lies around a gap: the same noise, `off` elsewhere.
+    fn example(off: Shift) -> (MatchImage, Lenses, Vec<Place>) {
+        let mut image = MatchImage::new(64, 64);
+        image.fill_rows(|y, row| {
+            for (x, px) in row.iter_mut().enumerate() {
+                let mut rng = Rng::new(3, 0, (y / 2) as u32, (x / 2) as u64);
+                *px = [rng.below(128) as u8, rng.below(128) as u8, 0, 0];
+            }
+        });
+        let lenses = Lenses { size: (16, 24), border: 6 };
+        let old = pixels(lenses.window())
+            .map(|(y, x)| [14 + y as i32 + off[0], 16 + x as i32 + off[1]])
+            .collect();
+        (image, lenses, old)
+    }
+
+    /// The cost of a sequence of displacements along the top, by its definition.
+    fn cost(image: &MatchImage, lenses: &Lenses, old: &[Place], shifts: &[Shift]) -> f64 {
+        let apart = |a: Shift, b: Shift| f64::from((a[0] - b[0]).pow(2) + (a[1] - b[1]).pow(2));
+        let mut sum = 0.0;
+        for (point, &[dy, dx]) in shifts.iter().enumerate() {
+            let (mut squares, mut n) = (0, 0);
+            for (y, x) in pixels(lenses.window()) {
+                let own = lenses.at((y, x)).is_some_and(|(side, _)| side == Side::Top);
+                if !own || (x - 6) / SPACING != point {
+                    continue;
+                }
+                let a = image.pixel((14 + y as i32 + dy) as usize, (16 + x as i32 + dx) as usize);
+                let [oy, ox] = old[y * 36 + x];
+                let b = image.pixel(oy as usize, ox as usize);
+                squares += (0..4).map(|k| u32::from(a[k].abs_diff(b[k])).pow(2)).sum::<u32>();
+                n += 1;
+            }
+            sum += f64::from(squares) / f64::from(n) + COST * apart([dy, dx], [0; 2]);
+            let before = if point == 0 { [0; 2] } else { shifts[point - 1] };
+            sum += BEND * apart([dy, dx], before);
+        }
+        sum + BEND * apart(*shifts.last().expect("a point"), [0; 2])
+    }
+
+    #[test]
+    fn no_sequence_of_displacements_is_better() {
+        for off in [[0, 0], [1, 0], [0, -1], [1, 1]] {
+            let (image, lenses, old) = example(off);
+            let found = along_side(&image, &lenses, Side::Top, [14, 16], &old, 1);
+            let one = |i: usize| [(i / 3) as i32 - 1, (i % 3) as i32 - 1];
+            let all = (0..9 * 9 * 9).map(|i| [one(i / 81), one(i / 9 % 9), one(i % 9)]);
+            let least = all.map(|s| cost(&image, &lenses, &old, &s)).fold(f64::MAX, f64::min);
+            assert!(
+                (cost(&image, &lenses, &old, &found) - least).abs() < 1e-6,
+                "{off:?}: {found:?}"
+            );
+            if off == [0, -1] {
+                assert_eq!(found, [off; 3], "the noise is where it was moved to");
+            }
+        }
+    }
+
+    #[test]
+    fn a_patch_is_bent_at_its_sides_and_not_in_the_middle() {
+        let (image, lenses, old) = example([0, -1]);
+        let straight = bent(&image, &lenses, [14, 16], &old, 0);
+        let bent = bent(&image, &lenses, [14, 16], &old, 2);
+        let moved = |y: usize, x: usize| {
+            let i = y * 36 + x;
+            [bent[i][0] - straight[i][0], bent[i][1] - straight[i][1]]
+        };
+        assert_eq!((moved(14, 18), moved(6, 18), moved(0, 0)), ([0, 0], [0, -1], [0, 0]));
+        assert!(bent.iter().zip(&straight).all(|(a, b)| a[0] == b[0] && (a[1] - b[1]).abs() <= 2));
+    }
 }

@@ -216,8 +216,8 @@ mod tests {
                             continue;
                         }
                         let there = source.pixel(place[0] as usize + y, place[1] as usize + x);
-                        for k in 0..3 {
-                            let (f, g) = (f64::from(frame.codes[at + k]), f64::from(there[k]));
+                        for (k, g) in there.into_iter().enumerate().take(3) {
+                            let (f, g) = (f64::from(frame.codes[at + k]), f64::from(g));
                             sum += (f - g).powi(2) as u64;
                             pairs.push((k, f, g));
                         }

@@ -2,8 +2,10 @@
 //! lie where its lattice says.
 
 mod deform;
+mod exemplar;
 mod gap;
 mod grid;
+mod paint;
 mod places;
 mod seam;
 
@@ -11,20 +13,15 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use crate::analyze::lattice::drift::Drift;
 use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
 use crate::base::rng::Rng;
-use crate::image::color::ColorModel;
-use crate::image::mask::Mask;
-use crate::image::picture::Picture;
-use crate::search::patch::MatchImage;
-use crate::search::patch::codes::Codes;
 use crate::search::patchmatch::Wrap;
 use crate::signal::basis::Basis;
-use crate::signal::resample::resized;
+pub use exemplar::Exemplar;
 use gap::Frame;
 use grid::{Axis, Block, Lenses, Side, is_sample, nearest_side};
+pub use paint::Strip;
 use places::{Offset, Places};
 
 /// How two patches are joined where they overlap.
@@ -74,82 +71,8 @@ pub struct Plan {
     pub feather: usize,
 }
 
-/// The photo in the matching space.
-#[derive(Debug)]
-pub struct Exemplar {
-    image: MatchImage,
-    /// How far its cells lie beside the lattice.
-    drift: Drift,
-    /// How many pixels above and left of each are not usable; `None` if all are.
-    unusable: Option<Vec<u32>>,
-}
-
-impl Exemplar {
-    /// The photo, and where it may be used. With a lattice it is found out how far each of its cells
-    /// lies beside its place, and patches are taken from where the cell is.
-    pub fn new(photo: &Picture, mask: Option<&Mask>, straightened: Option<Basis>) -> Self {
-        let size = (photo.height(), photo.width());
-        let model = ColorModel::new(photo);
-        let pixels = model.averaging_pixels(photo);
-        let usable = mask.map(Mask::usable);
-        let codes = Codes::covering(&[(&pixels, usable)], model.space());
-        let image = codes.image(&pixels, size, model.space());
-        let drift = straightened.map_or_else(Drift::none, |basis| {
-            Drift::measured(basis, size, |scale| {
-                let to = |n: usize| (n as f64 * scale).round().max(1.0) as usize;
-                let to = (to(size.0), to(size.1));
-                codes.image(&resized(&pixels, size, to), to, model.space())
-            })
-        });
-        let unusable = usable.map(|usable| {
-            let (h, w) = size;
-            let mut sums = vec![0; (h + 1) * (w + 1)];
-            for y in 0..h {
-                let mut row = 0;
-                for x in 0..w {
-                    row += u32::from(!usable[y * w + x]);
-                    sums[(y + 1) * (w + 1) + x + 1] = sums[y * (w + 1) + x + 1] + row;
-                }
-            }
-            sums
-        });
-        Self { image, drift, unusable }
-    }
-
-    /// How far its cells lie beside the lattice.
-    pub fn drift(&self) -> &Drift {
-        &self.drift
-    }
-
-    /// Whether a window with this top left corner, and `margin` around it, can be copied.
-    fn fits(&self, [y, x]: Offset, (height, width): (usize, usize), margin: usize) -> bool {
-        let (h, w, m) = (self.image.height() as i64, self.image.width() as i64, margin as i64);
-        let (y, x) = (y - m, x - m);
-        let (height, width) = (height + 2 * margin, width + 2 * margin);
-        if y < 0 || x < 0 || y + height as i64 > h || x + width as i64 > w {
-            return false;
-        }
-        let Some(sums) = &self.unusable else { return true };
-        let at = |y: usize, x: usize| sums[y * (w as usize + 1) + x];
-        let (y, x) = (y as usize, x as usize);
-        at(y + height, x + width) + at(y, x) == at(y + height, x) + at(y, x + width)
-    }
-}
-
 /// A place of the photo: row, column.
 type Place = [i32; 2];
-
-/// Some rows of the output.
-#[derive(Debug)]
-pub struct Strip {
-    /// The first row.
-    pub first: usize,
-    /// The photo's row and column of every pixel, row by row.
-    pub from: Vec<[u32; 2]>,
-    /// What each pixel is mixed with: the photo's row and column, and how much of it in 255ths. Empty
-    /// if nothing is mixed.
-    pub mixed: Vec<([u32; 2], u8)>,
-}
 
 /// A filled gap: of every pixel of its window, row by row, what of the photo it shows and how much of
 /// the gap is in it, in 255ths.
@@ -398,94 +321,6 @@ impl<'a> Mosaic<'a> {
         let second = self.filled(ctx, &second, before)?;
         let filled: Vec<(Block, Filled)> = first.into_iter().chain(second).collect();
         self.painted(ctx, block_rows, &filled)
-    }
-
-    /// Puts samples and gaps together, the gaps in this order.
-    fn painted(
-        &self,
-        ctx: &Ctx,
-        block_rows: std::ops::Range<usize>,
-        filled: &[(Block, Filled)],
-    ) -> Result<Strip> {
-        let (height, width) = self.plan.size;
-        let rows = block_rows.start as i64..block_rows.end as i64;
-        let bottom = |r: i64| (self.rows.edge(r) as usize).min(height);
-        let begin = bottom(rows.start);
-        let mut from = vec![[0; 2]; (bottom(rows.end) - begin) * width];
-        let mixes = self.plan.seam == Seam::Linear || self.plan.feather > 0;
-        let mut mixed = vec![([0; 2], 0); if mixes { from.len() } else { 0 }];
-        // A row of blocks each, so that they can be painted side by side.
-        let mut bands = Vec::new();
-        let (mut from_rest, mut mixed_rest) = (&mut from[..], &mut mixed[..]);
-        for r in rows {
-            let n = (bottom(r + 1) - bottom(r)) * width;
-            let (own, rest) = from_rest.split_at_mut(n);
-            from_rest = rest;
-            let (own_mixed, rest) = mixed_rest.split_at_mut(if mixes { n } else { 0 });
-            mixed_rest = rest;
-            bands.push((r, own, own_mixed));
-        }
-        bands.into_par_iter().try_for_each(|(r, from, mixed)| {
-            let top = bottom(r) as i64;
-            let rows = top..bottom(r + 1) as i64;
-            for c in 0..self.columns.blocks as i64 {
-                self.paint_samples(ctx, [r, c], &rows, from)?;
-            }
-            for (place, mixed) in from.iter().zip(mixed.iter_mut()) {
-                *mixed = (*place, 0);
-            }
-            for (block, gap) in filled.iter().filter(|([row, _], _)| row.abs_diff(r) <= 1) {
-                let [wy, wx] = self.window_at(*block, [0, 0]);
-                let window = self.lenses(*block).window();
-                for (y, line) in (wy..).zip(0..window.0).filter(|(y, _)| rows.contains(y)) {
-                    let columns = wx.max(0)..(wx + window.1 as i64).min(width as i64);
-                    for x in columns {
-                        let i = line * window.1 + (x - wx) as usize;
-                        let share = gap.shares[i];
-                        if share == 0 {
-                            continue;
-                        }
-                        let k = (y - top) as usize * width + x as usize;
-                        let (old, new) = (from[k], gap.places[i].map(|v| v as u32));
-                        from[k] = if share >= 128 { new } else { old };
-                        if mixes {
-                            // Of nothing it is not even known where it would come from.
-                            mixed[k] = match share {
-                                255 => (new, 0),
-                                128..255 => (old, 255 - share),
-                                _ => (new, share),
-                            };
-                        }
-                    }
-                }
-            }
-            ctx.step(0)
-        })?;
-        Ok(Strip { first: begin, from, mixed })
-    }
-
-    /// A block of one sample, or a gap's of the four around it as far as they reach.
-    fn paint_samples(
-        &self,
-        ctx: &Ctx,
-        block: Block,
-        rows: &std::ops::Range<i64>,
-        from: &mut [[u32; 2]],
-    ) -> Result<()> {
-        let width = self.plan.size.1;
-        let [y0, x0] = self.corner(block);
-        let size = self.lenses(block).size;
-        let sample = is_sample(block).then(|| self.sample(ctx, block)).transpose()?;
-        let around = if sample.is_none() { self.around(ctx, block)? } else { [[0; 2]; 4] };
-        for y in y0..(y0 + size.0 as i64).min(rows.end) {
-            for x in x0..(x0 + size.1 as i64).min(width as i64) {
-                let at = ((y - y0) as usize, (x - x0) as usize);
-                let [oy, ox] = sample.unwrap_or_else(|| around[nearest_side(size, at) as usize]);
-                from[(y - rows.start) as usize * width + x as usize] =
-                    [(y + oy) as u32, (x + ox) as u32];
-            }
-        }
-        Ok(())
     }
 }
 
