@@ -68,8 +68,8 @@ from texforge._types import (
     Symmetries,
     TextureCost,
     Tile,
-    TileOptions,
     Tileable,
+    TileOptions,
 )
 
 __all__ = [

@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import json
 from collections.abc import Mapping, Sequence  # noqa: TC003 (the signatures can be resolved at run time)
-from typing import TYPE_CHECKING, Any, Literal, Unpack
+from typing import Any, Literal, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -35,9 +35,6 @@ from texforge._types import (
     Tile,
     TileOptions,
 )
-
-if TYPE_CHECKING:
-    from texforge._extract import ExtractedTile
 
 __all__ = ["apply", "load_source_map", "read_image", "tile", "tile_variants", "write_image"]
 

@@ -572,8 +572,8 @@ class Regular(Texture):
     seed : int
         Seed of all random choices.
     params : dict
-        Every parameter that `texforge.regular` used, with `size` as (height, width) and with what it
-        chose by itself: ``regular(photo, **params)`` makes the same again.
+        Every parameter that `texforge.regular` used, with `size` as (height, width), and with what
+        it chose by itself: ``regular(photo, **params)`` makes the same again.
     report : dict
         How the texture was made: version, seconds, how far cells were moved into place, notes and
         so on. Sizes in it are (width, height).

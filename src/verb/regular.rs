@@ -640,8 +640,8 @@ fn flattened(
         return Ok(None);
     }
     flatten::check_reach(share)?;
-    if share > 1.0 {
-        return Err(Error::parameter("flatten", "at most 1", share));
+    if !(0.0..=1.0).contains(&share) {
+        return Err(Error::parameter("flatten", "0 (off) to 1", share));
     }
     if share == 0.0 {
         return Ok(None);
