@@ -14,10 +14,10 @@ GALLERY ?=
 QUALITY ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-rust test-python lint format gallery quality lattices extracts readme-pictures bench bench-peers bench-record wheel ci clean
+.PHONY: help setup demo test test-rust test-python lint format gallery quality lattices extracts regular-gallery readme-pictures bench bench-peers bench-record wheel ci clean
 
 help: ## List the targets.
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-15s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 # The virtual environment with everything but texforge itself.
 $(BIN)/.ready: pyproject.toml
@@ -79,6 +79,9 @@ lattices: setup ## Print which lattices of EXEMPLARS are found and refused; draw
 extracts: setup ## Extract the tiles of EXEMPLARS that repeat; show them repeated, in extracts/.
 	$(BIN)/python docs/extracts.py "$(EXEMPLARS)"
 
+regular-gallery: setup ## Make larger textures and tiles of EXEMPLARS that repeat; measure them, in regular-gallery/.
+	$(BIN)/python docs/regular.py "$(EXEMPLARS)"
+
 readme-pictures: setup ## Make the README's pictures anew, in docs/pictures/.
 	$(BIN)/python docs/readme_pictures.py
 
@@ -98,4 +101,4 @@ wheel: $(BIN)/.ready ## Build the wheel for distribution, in dist/.
 ci: lint test ## What CI runs.
 
 clean: ## Remove what was built.
-	rm -rf target $(VENV) demo gallery lattices extracts dist
+	rm -rf target $(VENV) demo gallery lattices extracts regular-gallery dist

@@ -4,8 +4,8 @@
 and says which pixel of the photo each of its pixels is, so that other maps of the same material
 can follow (`apply`). `palette` shows how even it can become. `detect_lattice` finds by which
 displacements a photo of bricks, tiles or cloth repeats, `extract` cuts out the tile of such a photo
-that stands best for all of it. `texture_cost` measures how much a texture
-looks like its photo.
+that stands best for all of it, `regular` makes a texture of any size from it. `texture_cost`
+measures how much a texture looks like its photo.
 `read_image` and `write_image` keep all the bits that files have. `study` compares the ways to
 tile over many photos.
 Everything raised on purpose is a `TexforgeError`.
@@ -39,6 +39,7 @@ from texforge._extract import ExtractedTile, Extraction, extract
 from texforge._lattice import detect_lattice
 from texforge._measure import texture_cost
 from texforge._palette import Palette, palette
+from texforge._regular import regular
 from texforge._study import Study, study
 from texforge._texforge import __version__
 from texforge._types import (
@@ -50,19 +51,24 @@ from texforge._types import (
     ImageLike,
     Lattice,
     MapKind,
+    Matching,
     Measure,
     Method,
     PathType,
     Progress,
     ProgressBar,
     Quality,
+    Regular,
     Scaling,
+    Seam,
     Snap,
     SourceMap,
     Step,
+    Straightening,
     Symmetries,
     TextureCost,
     Tile,
+    Tileable,
     TileOptions,
 )
 
@@ -82,6 +88,7 @@ __all__ = [
     "InternalError",
     "Lattice",
     "MapKind",
+    "Matching",
     "Measure",
     "Method",
     "MissingFileError",
@@ -96,17 +103,21 @@ __all__ = [
     "ProgressBar",
     "Quality",
     "ReadError",
+    "Regular",
     "SameFileError",
     "Scaling",
+    "Seam",
     "Snap",
     "SourceMap",
     "Step",
+    "Straightening",
     "Study",
     "Symmetries",
     "TexforgeError",
     "TextureCost",
     "Tile",
     "TileOptions",
+    "Tileable",
     "__version__",
     "apply",
     "detect_lattice",
@@ -114,6 +125,7 @@ __all__ = [
     "load_source_map",
     "palette",
     "read_image",
+    "regular",
     "study",
     "texture_cost",
     "tile",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import json
 from collections.abc import Mapping, Sequence  # noqa: TC003 (the signatures can be resolved at run time)
-from typing import TYPE_CHECKING, Any, Literal, Unpack
+from typing import Any, Literal, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -20,26 +20,29 @@ from texforge._types import (
     Follow,
     Image,
     ImageLike,
+    Lattice,
     MapKind,
     Measure,
     Method,
     PathType,
     Progress,
     Quality,
+    Regular,
     SourceMap,
     Step,
     Symmetries,
+    Texture,
     Tile,
     TileOptions,
 )
-
-if TYPE_CHECKING:
-    from texforge._extract import ExtractedTile
 
 __all__ = ["apply", "load_source_map", "read_image", "tile", "tile_variants", "write_image"]
 
 # Longest side of a notebook's picture: larger ones only slow the page down.
 _PREVIEW_SIDE = 1024
+
+# Kinds of parameters that are numbers.
+_NUMBERS = ("integer", "number", "optional number")
 
 
 def tile(
@@ -304,7 +307,7 @@ def tiles(
         _arrays.picture(other, f"photo {i}", encoding) for i, other in enumerate(also or (), 2)
     ]
     texts = [
-        (param["name"], parameter_text(param["name"], param["kind"], params[param["name"]]))
+        (param["name"], parameter_text(param, params[param["name"]]))
         for param in _texforge.schema()
     ]
     if maps and params["method"] == "make-seamless":
@@ -349,7 +352,7 @@ def _tile(photo: _arrays.Picture, others: dict[str, list[_arrays.Picture]], part
         source_map=None if map_out is None else map_positions(map_out),
         costs=Costs(**report["costs"]),
         seed=report["seed"],
-        params=_typed(dict(report["params"])),
+        params=typed_params("tile", report),
         report=report,
         maps={name: others[name][0].unpacked(parts) for name, parts in maps_out},
         encoding=_arrays.array_encoding(picture_out[3]),
@@ -361,7 +364,7 @@ def _tile(photo: _arrays.Picture, others: dict[str, list[_arrays.Picture]], part
 
 
 def apply(
-    source_map: Tile | SourceMap | npt.ArrayLike,
+    source_map: Tile | Regular | SourceMap | npt.ArrayLike,
     image: ImageLike,
     *,
     kind: MapKind = "data",
@@ -372,8 +375,8 @@ def apply(
 
     Parameters
     ----------
-    source_map : Tile, SourceMap or (H, W, 2) array_like of int
-        Row and column of the photo's pixel that each pixel of the tile is a copy of.
+    source_map : Tile, Regular, SourceMap or (H, W, 2) array_like of int
+        Row and column of the photo's pixel that each pixel of the texture is a copy of.
     image : (H', W') or (H', W', C) array_like, or Pillow image
         The map, showing the same as the photo. At another resolution (but the same aspect ratio)
         it is read in between its pixels, bilinearly; otherwise values are copied bit for bit.
@@ -407,7 +410,7 @@ def apply(
     >>> texforge.apply([[[1, 1], [0, 1], [0, 0]]], height)
     array([[1.  , 0.25, 0.  ]])
     """
-    if isinstance(source_map, Tile):
+    if isinstance(source_map, Texture):
         source_map = _source_map_of(source_map)
     encoding: Literal["auto", "data"] = "auto" if kind == "color" else "data"
     other = _arrays.picture(image, "the map", encoding)
@@ -533,48 +536,52 @@ def load_source_map(path: PathType) -> SourceMap:
     return SourceMap(map_positions(parts), first, tuple(further), _origins(parts))
 
 
-def save_source_map(tile: Tile, path: PathType, *, overwrite: bool) -> None:
+def save_source_map(texture: Texture, path: PathType, *, overwrite: bool) -> None:
     """See `Tile.save_source_map`."""
-    source_map = _source_map_of(tile)
     _texforge.write_source_map(
         path=_arrays.path(path),
-        source_map=_arrays.packed_map(source_map),
+        source_map=_arrays.packed_map(_source_map_of(texture)),
         overwrite=bool(overwrite),
     )
 
 
-def save_tile(tile: Tile, path: PathType, *, overwrite: bool) -> None:
+def save_texture(texture: Texture, path: PathType, *, verb: str, overwrite: bool) -> None:
     """See `Tile.save`."""
-    texts = {param["name"] for param in _texforge.schema() if param["kind"] in ("choice", "size")}
+    numbers = {p["name"] for p in _texforge.schema(verb) if p["kind"] in _NUMBERS}
     params = {
-        name: text if name in texts else None if text == "none" else json.loads(text)
-        for name, text in tile.report["params"]
+        name: text if name not in numbers else None if text == "none" else json.loads(text)
+        for name, text in texture.report["params"]
     }
-    # As the command line writes it, so that equal tiles make equal files.
+    # As the command line writes it, so that equal textures make equal files.
     made = {
         "tool": "texforge",
-        "version": tile.report["version"],
-        "verb": "tile",
-        "seed": tile.seed,
+        "version": texture.report["version"],
+        "verb": verb,
+        "seed": texture.seed,
         "params": params,
     }
-    if "redo" in tile.report:
-        made["redo"] = tile.report["redo"]
+    if "redo" in texture.report:
+        made["redo"] = texture.report["redo"]
     _texforge.write(
         path=_arrays.path(path),
-        picture=_arrays.picture(tile.image, "the tile", tile.encoding).packed(),
-        kind="data" if tile.encoding == "data" else "color",
+        picture=_arrays.picture(texture.image, f"the {verb}", texture.encoding).packed(),
+        kind="data" if texture.encoding == "data" else "color",
         record=json.dumps(made, sort_keys=True, separators=(",", ":")),
         overwrite=bool(overwrite),
     )
 
 
-def preview_png(tile: Tile | ExtractedTile) -> bytes | None:
-    """Return the tile repeated two by two as an 8-bit PNG; None for data that is no picture."""
-    image = _arrays.displayable(tile.image, tile.encoding)
+def preview_png(
+    picture: npt.NDArray[Any], encoding: Encoding, times: tuple[int, int]
+) -> bytes | None:
+    """Return a picture, so many times downwards and across, as an 8-bit PNG that fits a screen.
+
+    None for data that is no picture.
+    """
+    image = _arrays.displayable(picture, encoding)
     if image is None:
         return None
-    image = np.tile(image, (2, 2, 1))
+    image = np.tile(image, (*times, 1))
     # Averages whole blocks; texels at the far edge that fill no block are left out.
     step = -(-max(image.shape[:2]) // _PREVIEW_SIDE)
     if step > 1:
@@ -589,14 +596,17 @@ def png(image: npt.NDArray[Any]) -> bytes:
     return bytes(_texforge.encode_png(picture=_arrays.picture(image, "the preview").packed()))
 
 
-def _source_map_of(tile: Tile) -> SourceMap:
-    if tile.source_map is None:
+def _source_map_of(texture: Texture) -> SourceMap:
+    if texture.source_map is None:
         raise ParameterError(
             "`source_map` must be that of a tile made of copied pixels, got None: the method "
             "'make-seamless' blends; choose another method",
             fields={"name": "source_map"},
         )
-    return SourceMap(tile.source_map, tile.photo_size, tile.also_sizes, tile.origins)
+    if isinstance(texture, Tile):
+        also = (texture.also_sizes, texture.origins)
+        return SourceMap(texture.source_map, texture.photo_size, *also)
+    return SourceMap(texture.source_map, texture.photo_size)
 
 
 def _redone(redo: object, redo_of: Any, photo: _arrays.Picture) -> Any:
@@ -652,44 +662,53 @@ def _origins(parts: Any) -> npt.NDArray[np.int32] | None:
     return np.frombuffer(origins, dtype=np.int32).reshape(height, width, 2)
 
 
-def _size_text(size: object) -> str:
-    if size is None:
-        return "auto"
-    sides: tuple[Any, ...] = tuple(size) if isinstance(size, tuple | list) else (size, size)
-    if len(sides) != 2:
-        raise ParameterError(
-            f"`size` must be one number or (height, width), got {size!r}", fields={"name": "size"}
-        )
-    height, width = (_arrays.integer("size", side, 1) for side in sides)
-    return f"{width}x{height}"
+def _pair(name: str, value: Any, expected: str) -> tuple[Any, Any]:
+    """Return the two things that an argument consists of."""
+    if not isinstance(value, tuple | list) or len(value) != 2:
+        raise ParameterError(f"`{name}` must be {expected}, got {value!r}", fields={"name": name})
+    return value[0], value[1]
 
 
-def parameter_text(name: str, kind: str, value: Any) -> str:
-    """Return a parameter as the text that the core reads."""
+def parameter_text(param: Mapping[str, Any], value: Any) -> str:
+    """Return a parameter of the schema as the text that the core reads."""
+    name, kind = param["name"], param["kind"]
+    if value is None and kind in ("size", *_NUMBERS) and param["default"] in ("auto", "none"):
+        return str(param["default"])
     if kind == "size":
-        return _size_text(value)
+        sides = value if isinstance(value, tuple | list) else (value, value)
+        height, width = (
+            _arrays.integer(name, side, 1)
+            for side in _pair(name, sides, "one number or (height, width)")
+        )
+        return f"{width}x{height}"
     if kind == "integer":
         return str(_arrays.integer(name, value))
-    if kind == "optional number":
-        return "none" if value is None else _arrays.number(name, value)
-    return _arrays.number(name, value) if kind == "number" else _arrays.word(name, value)
+    if kind == "lattice" and not isinstance(value, str):
+        expected = '"auto", "none", a Lattice or two displacements ((x, y), (x, y))'
+        vectors = (value.v1, value.v2) if isinstance(value, Lattice) else value
+        numbers = [
+            _arrays.number(name, number)
+            for vector in _pair(name, vectors, expected)
+            for number in _pair(name, vector, expected)
+        ]
+        return ",".join(numbers)
+    return _arrays.number(name, value) if kind in _NUMBERS else _arrays.word(name, value)
 
 
-def _typed(params: dict[str, str]) -> dict[str, Any]:
-    """Return parameters that the core wrote as text in the types that `tile` takes."""
-    typed: dict[str, Any] = {}
-    for param in _texforge.schema():
-        name, text = param["name"], params.get(param["name"])
-        if text is None:
-            continue
-        if param["kind"] == "size":
-            typed[name] = None if text == "auto" else tuple(map(int, reversed(text.split("x"))))
-        elif param["kind"] == "integer":
-            typed[name] = int(text)
-        elif param["kind"] == "number":
-            typed[name] = float(text)
-        elif param["kind"] == "optional number":
-            typed[name] = None if text == "none" else float(text)
-        else:
-            typed[name] = text
-    return typed
+def typed_params(verb: str, report: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a report's parameters, written as text, in the types that the function takes."""
+    texts = dict(report["params"])
+    return {p["name"]: _typed(p["kind"], texts[p["name"]]) for p in _texforge.schema(verb)}
+
+
+def _typed(kind: str, text: str) -> Any:
+    if kind == "size":
+        return None if text == "auto" else tuple(map(int, reversed(text.split("x"))))
+    if kind == "integer":
+        return int(text)
+    if kind in _NUMBERS:
+        return None if text == "none" else float(text)
+    if kind == "lattice" and text != "none":
+        ax, ay, bx, by = map(float, text.split(","))
+        return (ax, ay), (bx, by)
+    return text

@@ -95,7 +95,7 @@ class ExtractedTile:
 
     def _repr_png_(self) -> bytes | None:
         """Return the tile repeated two by two, for notebooks."""
-        return _api.preview_png(self)
+        return _api.preview_png(self.image, self.encoding, (2, 2))
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -307,7 +307,7 @@ def extract(
     values = dict(locals())
     photo = _arrays.picture(image, "the photo", encoding)
     texts = [
-        (param["name"], _text(param["name"], param["kind"], values[param["name"]]))
+        (param["name"], _text(param, values[param["name"]]))
         for param in _texforge.schema("extract")
     ]
     others = {name: _api.maps_of(other, name, 0) for name, other in (maps or {}).items()}
@@ -362,15 +362,15 @@ def extract(
     )
 
 
-def _text(name: str, kind: str, value: Any) -> str:
+def _text(param: Mapping[str, Any], value: Any) -> str:
     """Return an argument as the text that the core reads."""
-    if kind == "period" and not isinstance(value, str):
+    if param["kind"] == "period" and not isinstance(value, str):
         sides = tuple(value) if isinstance(value, tuple | list) else ()
         if len(sides) != 2:
             raise ParameterError(
-                f"`{name}` must be (height, width), or one of auto, ssd, lattice, got {value!r}",
-                fields={"name": name},
+                f"`period` must be (height, width), or one of auto, ssd, lattice, got {value!r}",
+                fields={"name": "period"},
             )
-        height, width = (_arrays.number(name, side) for side in sides)
+        height, width = (_arrays.number("period", side) for side in sides)
         return f"{width}x{height}"
-    return _api.parameter_text(name, kind, value)
+    return _api.parameter_text(param, value)

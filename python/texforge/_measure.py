@@ -6,13 +6,23 @@ from typing import Literal
 
 from texforge import _arrays, _texforge
 from texforge._progress import reporting
-from texforge._types import Axis, Encoding, ImageLike, Progress, SourceMap, TextureCost, Tile
+from texforge._types import (
+    Axis,
+    Encoding,
+    ImageLike,
+    Progress,
+    Regular,
+    SourceMap,
+    Texture,
+    TextureCost,
+    Tile,
+)
 
 __all__ = ["texture_cost"]
 
 
 def texture_cost(
-    texture: Tile | ImageLike,
+    texture: Tile | Regular | ImageLike,
     photo: ImageLike,
     *,
     axis: Axis = "both",
@@ -31,7 +41,7 @@ def texture_cost(
 
     Parameters
     ----------
-    texture : Tile, (H, W) or (H, W, C) array_like, or Pillow image
+    texture : Tile, Regular, (H, W) or (H, W, C) array_like, or Pillow image
         The texture; of the photo's data type and number of channels. A `Tile` also says where its
         pixels come from, which narrows the margin by much.
     photo : (H', W') or (H', W', C) array_like, or Pillow image
@@ -88,7 +98,7 @@ def texture_cost(
     (True, 0.0)
     """
     original = _arrays.picture(photo, "the photo", encoding)
-    image: ImageLike = texture.image if isinstance(texture, Tile) else texture
+    image: ImageLike = texture.image if isinstance(texture, Texture) else texture
     source_map = None
     if isinstance(texture, Tile) and texture.source_map is not None:
         source_map = _arrays.packed_map(

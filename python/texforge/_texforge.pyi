@@ -34,6 +34,7 @@ __all__ = [
     "map_kind",
     "read",
     "read_source_map",
+    "regular",
     "schema",
     "texture_cost",
     "tiles",
@@ -89,6 +90,16 @@ def extract(
     threads: int,
     progress: Callable[[float], object] | None,
 ) -> tuple[list[_Extracted], list[tuple[str, list[_PictureOut]]], _PictureOut, str]: ...
+def regular(
+    *,
+    photo: _Picture,
+    mask: _Picture | None,
+    maps: list[tuple[str, list[_Picture], str]],
+    params: list[tuple[str, str]],
+    seed: int,
+    threads: int,
+    progress: Callable[[float], object] | None,
+) -> tuple[_PictureOut, _MapOut, list[tuple[str, _PictureOut]], str]: ...
 def lattice_overlay(*, picture: _Picture, v1: _Vector, v2: _Vector) -> _PictureOut: ...
 def lattice_snap(
     *, v1: _Vector, v2: _Vector, width: int, height: int

@@ -5,7 +5,16 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol, TypeAlias, TypedDict
+from typing import (
+    TYPE_CHECKING,
+    Any,
+    ClassVar,
+    Literal,
+    NamedTuple,
+    Protocol,
+    TypeAlias,
+    TypedDict,
+)
 
 import numpy as np
 import numpy.typing as npt
@@ -22,20 +31,25 @@ __all__ = [
     "ImageLike",
     "Lattice",
     "MapKind",
+    "Matching",
     "Measure",
     "Method",
     "PathType",
     "Progress",
     "ProgressBar",
     "Quality",
+    "Regular",
     "Scaling",
+    "Seam",
     "Snap",
     "SourceMap",
     "Step",
+    "Straightening",
     "Symmetries",
     "TextureCost",
     "Tile",
     "TileOptions",
+    "Tileable",
 ]
 
 # Unions, not Literal["a", "b"]: mypy holds both for the same, stubtest only the union.
@@ -57,6 +71,14 @@ Follow: TypeAlias = Literal["off"] | Literal["auto"]
 """Whether a tile follows the photo's lattice."""
 Scaling: TypeAlias = Literal["down"] | Literal["off"]
 """Whether a photo is scaled so that its period is a whole number of pixels."""
+Tileable: TypeAlias = Literal["none"] | Literal["both"] | Literal["x"] | Literal["y"]
+"""In which directions a near-regular texture repeats."""
+Straightening: TypeAlias = Literal["off"] | Literal["on"]
+"""Whether cells that lie beside their place on the lattice are put into it."""
+Matching: TypeAlias = Literal["color"] | Literal["correlation"]
+"""By what a piece for a gap is chosen."""
+Seam: TypeAlias = Literal["graph"] | Literal["cut"] | Literal["linear"]
+"""How pieces are joined."""
 Encoding: TypeAlias = Literal["srgb"] | Literal["linear"] | Literal["data"]
 """What the numbers of a picture mean."""
 MapKind: TypeAlias = (
@@ -385,7 +407,58 @@ class SourceMap:
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class Tile:
+class Texture:
+    """A picture made of a photo's pixels: what `Tile` and `Regular` have in common."""
+
+    image: npt.NDArray[Any]
+    source_map: npt.NDArray[np.int32] | None
+    seed: int
+    params: dict[str, Any]
+    report: dict[str, Any]
+    maps: dict[str, npt.NDArray[Any]]
+    encoding: Encoding
+    photo_size: tuple[int, int]
+
+    _verb: ClassVar[str]
+    """The function that makes it."""
+
+    def save(self, path: PathType, *, overwrite: bool = False) -> None:
+        """Write the picture to a file that also records how it was made.
+
+        Parameters
+        ----------
+        path : path
+            The file; its extension decides the format.
+        overwrite : bool
+            Whether an existing file may be replaced.
+
+        Raises
+        ------
+        OutputExistsError
+            If the file exists and `overwrite` is False.
+        FormatError
+            If the format is unknown or cannot hold the picture as it is.
+        """
+        from texforge import _api
+
+        _api.save_texture(self, path, verb=self._verb, overwrite=overwrite)
+
+    def save_source_map(self, path: PathType, *, overwrite: bool = False) -> None:
+        """Write the source map to a file, for `texforge.load_source_map`.
+
+        ``texforge apply`` on the command line reads it too.
+        """
+        from texforge import _api
+
+        _api.save_source_map(self, path, overwrite=overwrite)
+
+    def tiled(self, rows: int = 3, columns: int = 3) -> npt.NDArray[Any]:
+        """Return the image repeated `rows` times downwards and `columns` times to the right."""
+        return np.tile(self.image, (rows, columns) + (1,) * (self.image.ndim - 2))
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Tile(Texture):
     """A texture that repeats, made by `texforge.tile`.
 
     In a notebook it shows itself repeated two by two.
@@ -424,18 +497,12 @@ class Tile:
         the only photo, as it lies.
     """
 
-    image: npt.NDArray[Any]
-    source_map: npt.NDArray[np.int32] | None
     costs: Costs
-    seed: int
-    params: dict[str, Any]
-    report: dict[str, Any]
-    maps: dict[str, npt.NDArray[Any]]
-    encoding: Encoding
-    photo_size: tuple[int, int]
     trace: list[Step]
     also_sizes: tuple[tuple[int, int], ...] = ()
     origins: npt.NDArray[np.int32] | None = None
+
+    _verb = "tile"
 
     def apply(
         self, image: ImageLike, *, kind: MapKind = "data", also: Sequence[ImageLike] = ()
@@ -467,40 +534,6 @@ class Tile:
 
         return _api.apply(self, image, kind=kind, also=also)
 
-    def save(self, path: PathType, *, overwrite: bool = False) -> None:
-        """Write the tile to a file that also records how it was made.
-
-        Parameters
-        ----------
-        path : path
-            The file; its extension decides the format.
-        overwrite : bool
-            Whether an existing file may be replaced.
-
-        Raises
-        ------
-        OutputExistsError
-            If the file exists and `overwrite` is False.
-        FormatError
-            If the format is unknown or cannot hold the picture as it is.
-        """
-        from texforge import _api
-
-        _api.save_tile(self, path, overwrite=overwrite)
-
-    def save_source_map(self, path: PathType, *, overwrite: bool = False) -> None:
-        """Write the source map to a file, for `texforge.load_source_map`.
-
-        ``texforge apply`` on the command line reads it too.
-        """
-        from texforge import _api
-
-        _api.save_source_map(self, path, overwrite=overwrite)
-
-    def tiled(self, rows: int = 3, columns: int = 3) -> npt.NDArray[Any]:
-        """Return the image repeated `rows` times downwards and `columns` times to the right."""
-        return np.tile(self.image, (rows, columns) + (1,) * (self.image.ndim - 2))
-
     def __repr__(self) -> str:
         """Say what it is in one line."""
         height, width = self.image.shape[:2]
@@ -510,4 +543,96 @@ class Tile:
         """Return the tile repeated two by two, for notebooks."""
         from texforge import _api
 
-        return _api.preview_png(self)
+        return _api.preview_png(self.image, self.encoding, (2, 2))
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Regular(Texture):
+    """A near-regular texture, made by `texforge.regular`.
+
+    In a notebook it shows itself, twice in the directions in which it repeats.
+
+    Attributes
+    ----------
+    image : (H, W) or (H, W, C) ndarray
+        The texture, with the data type and the number of channels of the photo.
+    source_map : (H, W, 2) ndarray of int32
+        Row and column of the photo's pixel that each pixel is a copy of. Where two are mixed, along
+        seams, the one that there is more of. With ``feather=0, flatten=0`` and seams that are not
+        ``"linear"`` nothing is mixed, and
+        ``image == photo[source_map[..., 0], source_map[..., 1]]``.
+    lattice : ((float, float), (float, float)) or None
+        The lattice that was followed, found or given: two displacements in pixels of the photo, to
+        the right and downwards. None if none was.
+    lattice_of_texture : ((float, float), (float, float)) or None
+        The same in the texture, where it is a little stretched if the texture repeats.
+    confidence : float or None
+        How sure it is that this is the photo's lattice, 0 to 1. None if it was given, or none was
+        followed.
+    seed : int
+        Seed of all random choices.
+    params : dict
+        Every parameter that `texforge.regular` used, with `size` as (height, width), and with what
+        it chose by itself: ``regular(photo, **params)`` makes the same again.
+    report : dict
+        How the texture was made: version, seconds, how far cells were moved into place, notes and
+        so on. Sizes in it are (width, height).
+    maps : dict
+        The other maps of the material that were given, matching `image`, and mixed as it is.
+    encoding : {"srgb", "linear", "data"}
+        What the numbers of `image` mean.
+    photo_size : (int, int)
+        Height and width of the photo.
+    """
+
+    source_map: npt.NDArray[np.int32]
+    lattice: tuple[tuple[float, float], tuple[float, float]] | None
+    lattice_of_texture: tuple[tuple[float, float], tuple[float, float]] | None
+    confidence: float | None
+
+    _verb = "regular"
+
+    def apply(self, image: ImageLike, *, kind: MapKind = "data") -> npt.NDArray[Any]:
+        """Make another map of the photo's material match the texture.
+
+        It copies, so where pixels are mixed along seams (`feather` above 0, or seams that are
+        ``"linear"``) it has hard edges there. The `maps` of `texforge.regular` are mixed
+        likewise.
+
+        Parameters
+        ----------
+        image : array_like
+            The map, showing the same as the photo; of any resolution with its aspect ratio.
+        kind : {"data", "color", "normal"}
+            What its numbers are: see `texforge.apply`.
+
+        Returns
+        -------
+        ndarray
+            The map's texture, of the map's data type.
+
+        Raises
+        ------
+        PictureError
+            If the map has another aspect ratio than the photo.
+        """
+        from texforge import _api
+
+        return _api.apply(self, image, kind=kind)
+
+    def __repr__(self) -> str:
+        """Say what it is in one line."""
+        height, width = self.image.shape[:2]
+        lattice = "no lattice"
+        if self.lattice:
+            (ax, ay), (bx, by) = self.lattice
+            lattice = f"lattice ({ax:.2f}, {ay:.2f}), ({bx:.2f}, {by:.2f})"
+        return f"Regular({height} x {width} {self.image.dtype}, {lattice}, seed {self.seed})"
+
+    def _repr_png_(self) -> bytes | None:
+        """Return the texture, twice in the directions in which it repeats, for notebooks."""
+        from texforge import _api
+
+        tileable = self.params["tileable"]
+        times = (1 + (tileable in ("both", "y")), 1 + (tileable in ("both", "x")))
+        return _api.preview_png(self.image, self.encoding, times)

@@ -9,6 +9,7 @@ mod array;
 mod enter;
 mod error;
 mod extract;
+mod regular;
 
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -32,6 +33,7 @@ use crate::verb::inputs::Inputs;
 use crate::verb::lattice::{Lattice, LatticeParams, detect_lattice, lattice_autocorrelation};
 use crate::verb::params::TileParams;
 use crate::verb::redo::Redo;
+use crate::verb::regular::RegularParams;
 use crate::verb::texture_cost as measure;
 use crate::verb::texture_cost::TextureCostParams;
 use crate::verb::tile::{Step, Tile};
@@ -339,7 +341,8 @@ fn map_kind(name: &str) -> String {
     material::classify(name).map_or(MapKind::Data, |(_, kind)| kind).show()
 }
 
-/// Every parameter of a Python function (`texture_cost`, `detect_lattice`, `extract`, else `tile`), with its default as text.
+/// Every parameter of a Python function (`texture_cost`, `detect_lattice`, `extract`, `regular`, else
+/// `tile`), with its default as text.
 #[pyfunction]
 #[pyo3(signature = (verb = "tile"))]
 fn schema<'py>(py: Python<'py>, verb: &str) -> PyResult<Vec<Bound<'py, PyDict>>> {
@@ -358,6 +361,7 @@ fn schema<'py>(py: Python<'py>, verb: &str) -> PyResult<Vec<Bound<'py, PyDict>>>
         TextureCostParams::VERB => TextureCostParams::schema(),
         "detect_lattice" => LatticeParams::schema(),
         ExtractParams::VERB => ExtractParams::schema(),
+        RegularParams::VERB => RegularParams::schema(),
         _ => TileParams::schema(),
     };
     params.into_iter().map(entry).collect()
@@ -408,6 +412,8 @@ fn cli_study(py: Python<'_>, args: Vec<OsString>) -> PyResult<(u8, Option<Bound<
 mod _texforge {
     #[pymodule_export]
     use super::extract::extract;
+    #[pymodule_export]
+    use super::regular::regular;
     #[pymodule_export]
     use super::{
         apply, cli_main, cli_study, encode_png, error_kinds, fail, lattice, lattice_overlay,

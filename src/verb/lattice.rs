@@ -105,17 +105,25 @@ impl Lattice {
 pub fn detect_lattice(ctx: &Ctx, photo: &Picture, params: &LatticeParams) -> Result<Lattice> {
     params.validate()?;
     ctx.begin(lattice::STEPS);
-    detect(ctx, photo, params, false)
+    detect(ctx, photo, None, params, false)
 }
 
 /// The same with default parameters, quick where hardly anything repeats: there the guess is that of
 /// the coarsest scale.
 pub(super) fn glanced(ctx: &Ctx, photo: &Picture) -> Result<Lattice> {
-    detect(ctx, photo, &LatticeParams::default(), true)
+    detect(ctx, photo, None, &LatticeParams::default(), true)
 }
 
-fn detect(ctx: &Ctx, photo: &Picture, params: &LatticeParams, hurried: bool) -> Result<Lattice> {
-    let (pixels, mask) = ctx.install(|| prepared(photo))?;
+/// The same for a verb that counts its own progress; `usable` says where the photo may be looked at.
+/// `hurried`, it is quick where hardly anything repeats.
+pub(super) fn detect(
+    ctx: &Ctx,
+    photo: &Picture,
+    usable: Option<&Mask>,
+    params: &LatticeParams,
+    hurried: bool,
+) -> Result<Lattice> {
+    let (pixels, mask) = ctx.install(|| prepared(photo, usable))?;
     let size = (photo.height(), photo.width());
     let least = f64::from(params.min_period);
     let found = ctx.install(|| lattice::find(ctx, &pixels, size, mask.as_ref(), least, hurried))?;
@@ -146,7 +154,7 @@ fn detect(ctx: &Ctx, photo: &Picture, params: &LatticeParams, hurried: bool) -> 
 /// # Errors
 /// As [`detect_lattice`].
 pub fn lattice_autocorrelation(ctx: &Ctx, photo: &Picture) -> Result<(Picture, [f64; 2])> {
-    let (pixels, mask) = ctx.install(|| prepared(photo))?;
+    let (pixels, mask) = ctx.install(|| prepared(photo, None))?;
     let size = (photo.height(), photo.width());
     let small = reduced_size(size, MAP_SIDE);
     let gamma = ctx.install(|| {
@@ -170,7 +178,7 @@ fn constant() -> Error {
 }
 
 /// The photo's colours and what of it counts, checked.
-fn prepared(photo: &Picture) -> Result<(Vec<[f32; 3]>, Option<Mask>)> {
+fn prepared(photo: &Picture, usable: Option<&Mask>) -> Result<(Vec<[f32; 3]>, Option<Mask>)> {
     let (width, height) = (photo.width(), photo.height());
     if width.min(height) < SMALLEST {
         let (what, remedy) = ("the photo".into(), "take a larger piece of it".into());
@@ -183,7 +191,7 @@ fn prepared(photo: &Picture) -> Result<(Vec<[f32; 3]>, Option<Mask>)> {
     let model = ColorModel::new(photo);
     let mut colors = model.averaging_pixels(photo);
     colors.par_chunks_mut(width).for_each(|row| model.space().convert_row(row));
-    let mask = Mask::from_alpha(photo);
+    let mask = usable.cloned().or_else(|| Mask::from_alpha(photo));
     let mut usable = (0..colors.len()).filter(|&i| mask.as_ref().is_none_or(|m| m.usable()[i]));
     let first = usable.next();
     if first.is_none_or(|first| usable.all(|i| colors[i] == colors[first])) {

@@ -10,10 +10,16 @@ import pytest
 import texforge
 from texforge import _texforge
 
+FUNCTIONS = [
+    texforge.tile,
+    texforge.texture_cost,
+    texforge.detect_lattice,
+    texforge.extract,
+    texforge.regular,
+]
 
-@pytest.mark.parametrize(
-    "function", [texforge.tile, texforge.texture_cost, texforge.detect_lattice, texforge.extract]
-)
+
+@pytest.mark.parametrize("function", FUNCTIONS)
 def test_names_order_and_defaults_are_those_of_the_core(function: Callable[..., object]) -> None:
     signature = inspect.signature(function)
     options = [p for p in signature.parameters.values() if p.kind is p.KEYWORD_ONLY]
@@ -24,15 +30,17 @@ def test_names_order_and_defaults_are_those_of_the_core(function: Callable[..., 
         # What is left out: no number, or the size that fits.
         nothing = "none" if entry["kind"] == "optional number" else "auto"
         shown = nothing if option.default is None else option.default
-        if entry["kind"] == "number":
+        if entry["kind"] == "number" and option.default is not None:
             assert float(entry["default"]) == shown
         else:
             assert entry["default"] == str(shown)
 
 
-def test_the_words_accepted_are_those_of_the_core() -> None:
-    hints = typing.get_type_hints(texforge.tile)
-    choices = {e["name"]: tuple(e["choices"]) for e in _texforge.schema() if e["choices"]}
+@pytest.mark.parametrize("function", [texforge.tile, texforge.regular])
+def test_the_words_accepted_are_those_of_the_core(function: Callable[..., object]) -> None:
+    hints = typing.get_type_hints(function)
+    schema = _texforge.schema(function.__name__)
+    choices = {e["name"]: tuple(e["choices"]) for e in schema if e["choices"]}
     assert choices
     for name, words in choices.items():
         alternatives = typing.get_args(hints[name])
@@ -45,6 +53,7 @@ def test_everything_but_the_picture_is_keyword_only() -> None:
         texforge.apply,
         texforge.detect_lattice,
         texforge.extract,
+        texforge.regular,
         texforge.read_image,
         texforge.write_image,
     ):
@@ -53,9 +62,7 @@ def test_everything_but_the_picture_is_keyword_only() -> None:
             assert (parameter.kind is parameter.KEYWORD_ONLY) == optional, parameter
 
 
-@pytest.mark.parametrize(
-    "function", [texforge.tile, texforge.texture_cost, texforge.detect_lattice, texforge.extract]
-)
+@pytest.mark.parametrize("function", FUNCTIONS)
 def test_every_parameter_is_documented(function: Callable[..., object]) -> None:
     doc = inspect.getdoc(function)
     assert doc is not None
@@ -63,9 +70,7 @@ def test_every_parameter_is_documented(function: Callable[..., object]) -> None:
         assert f"\n{name} : " in doc
 
 
-@pytest.mark.parametrize(
-    "function", [texforge.tile, texforge.texture_cost, texforge.detect_lattice, texforge.extract]
-)
+@pytest.mark.parametrize("function", FUNCTIONS)
 def test_ranges_in_the_docs_are_those_of_the_core(function: Callable[..., object]) -> None:
     doc = " ".join((inspect.getdoc(function) or "").split())
     for entry in _texforge.schema(function.__name__):

@@ -40,6 +40,19 @@ def test_a_tile_from_everything(tmp_path: Path) -> None:
     assert_type(texforge.apply(loaded, photo), npt.NDArray[Any])
 
 
+def test_a_near_regular_texture() -> None:
+    y, x = np.mgrid[:64, :80]
+    photo = np.where((y % 16 < 3) | (x % 20 < 3), 200, 90).astype(np.uint8)
+    found = texforge.detect_lattice(photo)
+    for lattice in (found, ((20, 0), (0, 16.0))):
+        texture = texforge.regular(photo, size=(32, 40), lattice=lattice, tileable="both")
+        assert_type(texture, texforge.Regular)
+        assert_type(texture.source_map, npt.NDArray[np.int32])
+        assert_type(texture.apply(photo), npt.NDArray[Any])
+        assert_type(texforge.apply(texture, photo), npt.NDArray[Any])
+    texforge.regular(photo, lattice="none", seam="cut", maps={"height": photo}, straighten="off")
+
+
 def test_wrong_words_are_type_errors(photo: npt.NDArray[np.uint8]) -> None:
     # mypy complains about an ignore that is not needed: each line proves that it objects.
     wrong: list[texforge.TexforgeError] = []

@@ -150,7 +150,7 @@ impl<'a> RegularMaker<'a> {
         }
         let mut notes = Vec::new();
         let usable = usable(photo, mask)?;
-        let (lattice, confidence) = lattice(ctx, photo, params)?;
+        let (lattice, confidence) = lattice(ctx, photo, usable.as_ref(), params)?;
         let seconds = vec![("lattice", start.elapsed().as_secs_f64())];
         let start = Instant::now();
         let wrap = match params.tileable {

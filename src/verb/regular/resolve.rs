@@ -10,7 +10,7 @@ use crate::image::picture::Picture;
 use crate::method::flatten;
 use crate::search::patchmatch::Wrap;
 use crate::signal::basis::{Basis, area, coefficients, combined, dot, reduced};
-use crate::verb::lattice::{LatticeParams, detect_lattice};
+use crate::verb::lattice::{LatticeParams, detect};
 use crate::verb::params::Size;
 use crate::verb::regular::params::{Guide, RegularParams};
 
@@ -22,11 +22,11 @@ pub(super) const LEAST_BLOCK: usize = 8;
 
 /// Side of a block by itself: this share of the root of the cell's area (pieces smaller than a brick
 /// are joined within bricks, larger ones repeat recognizably), but at least this many pixels.
-const BLOCK_SHARE: f64 = 0.6;
+const BLOCK_SHARE: f64 = 1.0;
 const BLOCK_PIXELS: f64 = 64.0;
 
 /// Border by itself, as a share of the block: up to a half gives the seams more room, and time.
-const BORDER_SHARE: f64 = 0.375;
+const BORDER_SHARE: f64 = 0.45;
 
 /// Where the photo may be used, by mask and alpha (`None`: everywhere); checked to hold something that
 /// is not all alike.
@@ -59,6 +59,7 @@ pub(super) fn usable(photo: &Picture, mask: Option<&Mask>) -> Result<Option<Mask
 pub(super) fn lattice(
     ctx: &Ctx,
     photo: &Picture,
+    mask: Option<&Mask>,
     params: &RegularParams,
 ) -> Result<(Option<Basis>, Option<f64>)> {
     let basis = match params.lattice {
@@ -67,7 +68,7 @@ pub(super) fn lattice(
         Guide::Auto => {
             let asked =
                 LatticeParams { min_confidence: params.min_confidence, ..Default::default() };
-            let found = detect_lattice(ctx, photo, &asked)?;
+            let found = detect(ctx, photo, mask, &asked, false)?;
             if !found.found {
                 return Err(Error::NoStructure {
                     what: "lattice".into(),
@@ -228,8 +229,8 @@ pub(super) fn flattened(
         return Ok(None);
     }
     flatten::check_reach(share)?;
-    if share > 1.0 {
-        return Err(Error::parameter("flatten", "at most 1", share));
+    if !(0.0..=1.0).contains(&share) {
+        return Err(Error::parameter("flatten", "0 (off) to 1", share));
     }
     if share == 0.0 {
         return Ok(None);
