@@ -38,7 +38,7 @@ Examples:
   texforge regular gravel.jpg -o gravel.png --size 2048 --lattice none";
 
 /// How many pixels are made at a time: some hundred megabytes, and tens of rows of blocks.
-const STRIP_PIXELS: usize = 1 << 24;
+const STRIP_PIXELS: usize = 1 << 23;
 
 /// The command as it is typed.
 pub(super) fn command() -> Command {
