@@ -157,7 +157,7 @@ pub fn lattice_autocorrelation(ctx: &Ctx, photo: &Picture) -> Result<(Picture, [
         Ok(Autocorrelation::new(&planes, small))
     })?;
     let (rows, cols) = (2 * small.0 - 1, 2 * small.1 - 1);
-    let samples = Samples::F32(gamma.values().to_vec());
+    let samples = Samples::F32(gamma.values());
     let picture = Picture::new(rows, cols, 1, samples, Encoding::Data)?;
     Ok((picture, [small.1 as f64 / size.1 as f64, small.0 as f64 / size.0 as f64]))
 }

@@ -141,22 +141,26 @@ impl Plane {
     fn smoothed(gamma: &Autocorrelation, reach: [usize; 2]) -> Self {
         let reach = reach.map(|n| n as isize);
         let cols = (2 * reach[1] + 1) as usize;
-        let mut values = vec![0.0f32; (2 * reach[0] + 1) as usize * cols];
+        let upper = reach[0] as usize * cols;
+        let mut values = vec![0.0f32; 2 * upper + cols];
         // A picture of one row or column has no neighbours there.
         let (h, w) = (gamma.height() as isize - 1, gamma.width() as isize - 1);
-        values.par_chunks_mut(cols).enumerate().for_each(|(i, row)| {
-            let y = i as isize - reach[0];
-            for (j, value) in row.iter_mut().enumerate() {
-                let x = j as isize - reach[1];
-                let mut sum = 0.0;
-                for (dy, a) in [(-1, 0.25), (0, 0.5), (1, 0.25)] {
-                    for (dx, b) in [(-1, 0.25), (0, 0.5), (1, 0.25)] {
-                        sum += a * b * gamma.at((y + dy).clamp(-h, h), (x + dx).clamp(-w, w));
-                    }
+        values[upper..].par_chunks_mut(cols).enumerate().for_each_init(
+            || vec![0.0; cols + 2],
+            |column, (y, row)| {
+                let y = y as isize;
+                for (x, value) in (-reach[1] - 1..).zip(&mut *column) {
+                    let at = |y: isize| gamma.at(y.min(h).max(-h), x.min(w).max(-w));
+                    *value = 0.25 * at(y - 1) + 0.5 * at(y) + 0.25 * at(y + 1);
                 }
-                *value = sum;
-            }
-        });
+                for (value, near) in row.iter_mut().zip(column.windows(3)) {
+                    *value = 0.25 * near[0] + 0.5 * near[1] + 0.25 * near[2];
+                }
+            },
+        );
+        // Upwards it is its own mirror image.
+        let (above, below) = values.split_at_mut(upper);
+        above.iter_mut().rev().zip(&below[cols..]).for_each(|(to, from)| *to = *from);
         Self { reach, values }
     }
 
