@@ -152,6 +152,21 @@ macro_rules! params {
                 }
             }
 
+            /// The defaults with what `text` says for a parameter's name, checked as by `validate`.
+            ///
+            /// # Errors
+            /// [`Error::Parameter`](crate::Error::Parameter) naming the first that fails.
+            pub fn from_texts<'a>(
+                text: impl Fn(&'static str) -> Option<&'a str>,
+            ) -> $crate::base::error::Result<Self> {
+                let mut params = Self::default();
+                $(if let Some(text) = text(stringify!($field)) {
+                    params.set(stringify!($field), text)?;
+                })+
+                params.validate()?;
+                Ok(params)
+            }
+
             /// Every parameter as text, in order of declaration.
             pub fn show(&self) -> Vec<(&'static str, String)> {
                 use $crate::base::params::Value;

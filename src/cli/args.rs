@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::builder::{PossibleValuesParser, RangedU64ValueParser, StringValueParser, ValueParser};
 use clap::{Arg, ArgAction, ArgMatches, Command, ValueHint, value_parser};
 
-use crate::base::error::Result;
 use crate::base::params::{Param, Value as _};
+use crate::cli::small::SCHEMAS;
 use crate::cli::sources::Sources;
 use crate::cli::{maps, palette, study};
 use crate::image::material::MapKind;
@@ -64,8 +64,13 @@ pub(super) fn command() -> Command {
         .subcommand(
             Command::new("params")
                 .about("Lists the parameters of a command: meaning, default, range.")
-                .before_help("Examples:\n  texforge params tile\n  texforge params tile --json")
-                .arg(Arg::new("verb").value_name("COMMAND").value_parser(["tile"]).help("Only this command's"))
+                .before_help("Examples:\n  texforge params tile\n  texforge params lattice --json")
+                .arg(
+                    Arg::new("verb")
+                        .value_name("COMMAND")
+                        .value_parser(PossibleValuesParser::new(SCHEMAS.iter().map(|(verb, _)| *verb)))
+                        .help("Only this command's"),
+                )
                 .arg(json()),
         )
         .subcommand(
@@ -302,29 +307,9 @@ pub(super) fn flag(param: Param) -> Arg {
         .help(help)
 }
 
-/// The lattice's parameters as typed, checked one by one.
-pub(super) fn lattice_params(matches: &ArgMatches) -> Result<LatticeParams> {
-    let mut params = LatticeParams::default();
-    for param in LatticeParams::schema() {
-        if let Some(text) = matches.get_one::<String>(param.name) {
-            params.set(param.name, text)?;
-        }
-    }
-    params.validate()?;
-    Ok(params)
-}
-
-/// The tile's parameters as typed, checked one by one.
-pub(super) fn tile_params(matches: &ArgMatches) -> Result<TileParams> {
-    let mut params = TileParams::default();
-    for param in TileParams::schema() {
-        // A command may leave out some.
-        if let Ok(Some(text)) = matches.try_get_one::<String>(param.name) {
-            params.set(param.name, text)?;
-        }
-    }
-    params.validate()?;
-    Ok(params)
+/// What was typed for a parameter, or its default; a command may leave out some.
+pub(super) fn text<'a>(matches: &'a ArgMatches) -> impl Fn(&'static str) -> Option<&'a str> {
+    move |name| matches.try_get_one::<String>(name).ok().flatten().map(String::as_str)
 }
 
 pub(super) fn file(id: &'static str, value_name: &'static str, help: &'static str) -> Arg {
@@ -364,7 +349,10 @@ mod tests {
     fn no_flags_mean_the_default_parameters() {
         let matches = command().get_matches_from(["texforge", "tile", "a.jpg", "-o", "b.png"]);
         let (_, tile) = matches.subcommand().expect("tile");
-        assert_eq!(tile_params(tile).expect("defaults are valid"), TileParams::default());
+        assert_eq!(
+            TileParams::from_texts(text(tile)).expect("defaults are valid"),
+            TileParams::default()
+        );
     }
 
     #[test]
@@ -384,7 +372,7 @@ mod tests {
         let matches =
             command().get_matches_from(["texforge", "tile", "a", "-o", "b", "--patch", "-4"]);
         let (_, tile) = matches.subcommand().expect("tile");
-        let error = tile_params(tile).expect_err("negative");
+        let error = TileParams::from_texts(text(tile)).expect_err("negative");
         assert!(error.to_string().starts_with("`patch` must be"), "{error}");
     }
 }

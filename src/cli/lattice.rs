@@ -35,7 +35,7 @@ pub(super) fn run(matches: &ArgMatches) -> Result<()> {
     let path = |id| matches.get_one::<PathBuf>(id).cloned();
     let request = Request {
         photo: path("photo").unwrap_or_default(),
-        params: args::lattice_params(matches)?,
+        params: LatticeParams::from_texts(args::text(matches))?,
         overlay: path("overlay"),
         autocorrelation: path("autocorrelation"),
         force: matches.get_flag("force"),

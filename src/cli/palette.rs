@@ -113,7 +113,7 @@ pub(super) fn run(matches: &ArgMatches) -> Result<()> {
     let steps = matches.get_one("steps").copied().unwrap_or(2);
     let request = Request {
         sources: Sources::typed(matches),
-        params: args::tile_params(matches)?,
+        params: TileParams::from_texts(args::text(matches))?,
         tiles: (1..=steps).map(|i| files::numbered(&output, i)).collect(),
         sheet: output.with_extension("palette.png"),
         force: matches.get_flag("force"),

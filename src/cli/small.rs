@@ -13,43 +13,58 @@ use crate::cli::work::{Session, supervise, watch_signals};
 use crate::cli::{args, files};
 use crate::image::material::MapKind;
 use crate::image::picture::{Encoding, Picture};
+use crate::verb::lattice::LatticeParams;
 use crate::verb::params::TileParams;
 
 /// Version of what `--json` writes; goes up when a field changes its meaning or goes away.
 pub(super) const SCHEMA_VERSION: u32 = 1;
 
+/// A command and its parameters.
+type Schema = (&'static str, fn() -> Vec<Param>);
+
+/// The commands that have parameters of their own.
+pub(super) const SCHEMAS: &[Schema] =
+    &[(TileParams::VERB, TileParams::schema), (LatticeParams::VERB, LatticeParams::schema)];
+
 /// `texforge params`.
 pub(super) fn params(matches: &ArgMatches) -> Result<()> {
-    let schema = TileParams::schema();
+    let only = matches.get_one::<String>("verb");
+    let chosen = SCHEMAS.iter().filter(|(verb, _)| only.is_none_or(|only| only == verb));
     if matches.get_flag("json") {
-        let list: Vec<_> = schema
-            .iter()
-            .map(|p| {
-                json!({
-                    "name": p.name,
-                    "flag": format!("--{}", p.name.replace('_', "-")),
-                    "kind": p.kind,
-                    "choices": p.choices,
-                    "default": typed(p, &p.default),
-                    "range": p.range,
-                    "unit": p.unit,
-                    "doc": p.doc,
-                })
-            })
-            .collect();
-        return print_json(&json!({ "schema_version": SCHEMA_VERSION, TileParams::VERB: list }));
+        let mut object = serde_json::Map::new();
+        object.insert("schema_version".into(), SCHEMA_VERSION.into());
+        for (verb, schema) in chosen {
+            object.insert((*verb).into(), schema().iter().map(described).collect());
+        }
+        return print_json(&object);
     }
-    let mut text = format!("texforge {}\n", TileParams::VERB);
-    for p in &schema {
-        let accepts = if p.choices.is_empty() { p.range.clone() } else { p.choices.join(", ") };
-        let facts = [accepts.as_str(), p.unit];
-        let facts: Vec<_> = facts.into_iter().filter(|fact| !fact.is_empty()).collect();
-        let facts =
-            if facts.is_empty() { String::new() } else { format!(" ({})", facts.join("; ")) };
-        let flag = p.name.replace('_', "-");
-        text.extend([format!("  --{flag} {}{facts}\n      {}\n", p.default, p.doc)]);
+    let mut text = String::new();
+    for (verb, schema) in chosen {
+        text.extend([format!("texforge {verb}\n")]);
+        for p in schema() {
+            let accepts = if p.choices.is_empty() { p.range } else { p.choices.join(", ") };
+            let facts = [accepts.as_str(), p.unit];
+            let facts: Vec<_> = facts.into_iter().filter(|fact| !fact.is_empty()).collect();
+            let facts =
+                if facts.is_empty() { String::new() } else { format!(" ({})", facts.join("; ")) };
+            let flag = p.name.replace('_', "-");
+            text.extend([format!("  --{flag} {}{facts}\n      {}\n", p.default, p.doc)]);
+        }
     }
     to_stdout(text.as_bytes())
+}
+
+fn described(param: &Param) -> serde_json::Value {
+    json!({
+        "name": param.name,
+        "flag": format!("--{}", param.name.replace('_', "-")),
+        "kind": param.kind,
+        "choices": param.choices,
+        "default": typed(param, &param.default),
+        "range": param.range,
+        "unit": param.unit,
+        "doc": param.doc,
+    })
 }
 
 /// A parameter's text as the JSON type that it has.

@@ -70,7 +70,7 @@ pub(super) fn run(matches: &ArgMatches) -> Result<()> {
 impl Request {
     fn typed(matches: &ArgMatches) -> Result<Self> {
         let path = |id| matches.get_one::<PathBuf>(id).cloned();
-        let params = args::tile_params(matches)?;
+        let params = TileParams::from_texts(args::text(matches))?;
         let target = Target::typed(&path("output").unwrap_or_default())?;
         let sources = Sources::typed(matches);
         let maps = matches.get_many::<OsString>("map").into_iter().flatten();

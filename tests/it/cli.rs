@@ -233,6 +233,10 @@ mod telling {
         assert!(says(&["params", "tile"]).contains("0.01 to 1"));
         let v = json(&folder, &["params", "--json"]);
         assert_eq!(v["tile"][0]["name"], "size");
+        assert_eq!(v["lattice"][0]["flag"], "--min-confidence");
+        let v = json(&folder, &["params", "lattice", "--json"]);
+        assert_eq!(v["lattice"][1]["range"], "0 to 65536");
+        assert!(v.get("tile").is_none(), "only what was asked for: {v}");
         assert!(says(&["completions", "bash"]).contains("--uniformity"));
         assert!(says(&["man", "tile"]).contains(".TH"));
     }
