@@ -26,7 +26,7 @@ use crate::search::place_cost::PlaceCost;
 use crate::search::seams;
 use crate::search::source::Source;
 use crate::search::vote::{Votes, vote};
-use crate::signal::basis::Basis;
+use crate::signal::basis::{Basis, Vector};
 use crate::signal::histogram::{Distribution, SOFT_BITS};
 use crate::signal::measure::Statistic;
 use crate::signal::resample::resized;
@@ -85,11 +85,21 @@ pub struct Plan {
 
 /// A lattice in the photo, and how the output's axes are made of it.
 #[derive(Debug, Clone, Copy)]
-pub struct Periods {
-    /// Vectors in pixels of the photo, each to the right and downwards.
-    pub vectors: Basis,
-    /// Coefficients of the displacements by the output's width and by its height.
-    pub of_output: [[i64; 2]; 2],
+pub enum Periods {
+    /// The whole lattice.
+    Lattice {
+        /// Vectors in pixels of the photo, each to the right and downwards.
+        vectors: Basis,
+        /// Coefficients of the displacements by the output's width and by its height.
+        of_output: [[i64; 2]; 2],
+    },
+    /// Rows of the lattice alone: along them nothing is held.
+    Rows {
+        /// Rows a pixel of the photo: to the right and downwards.
+        frequency: Vector,
+        /// Rows that the output's width leads over, and its height.
+        of_output: [f64; 2],
+    },
 }
 
 impl Periods {
@@ -102,15 +112,23 @@ impl Periods {
     ) -> Option<Phase> {
         let view = source.atlas.views()[0].size;
         let (sy, sx) = (view.0 as f64 / photo.0 as f64, view.1 as f64 / photo.1 as f64);
-        let vectors = self.vectors.map(|[x, y]| [x * sx, y * sy]);
-        // Cells of the output: its sides are whole combinations of them.
-        let [[a, b], [c, d]] = self.of_output.map(|row| row.map(|n| n as f64));
-        let (w, h, n) = (size.1 as f64, size.0 as f64, a * d - b * c);
-        if n == 0.0 {
-            return None;
+        let (w, h) = (size.1 as f64, size.0 as f64);
+        match *self {
+            Self::Lattice { vectors, of_output } => {
+                let vectors = vectors.map(|[x, y]| [x * sx, y * sy]);
+                // Cells of the output: its sides are whole combinations of them.
+                let [[a, b], [c, d]] = of_output.map(|row| row.map(|n| n as f64));
+                let n = a * d - b * c;
+                if n == 0.0 {
+                    return None;
+                }
+                let output = [[d * w / n, -b * h / n], [-c * w / n, a * h / n]];
+                Phase::new(vectors, output, source.patch)
+            }
+            Self::Rows { frequency: [x, y], of_output: [a, b] } => {
+                Phase::rows([x / sx, y / sy], [a / w, b / h], source.patch)
+            }
         }
-        let output = [[d * w / n, -b * h / n], [-c * w / n, a * h / n]];
-        Phase::new(vectors, output, source.patch)
     }
 }
 

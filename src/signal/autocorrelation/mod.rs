@@ -307,7 +307,7 @@ mod tests {
         let planes = [random(h * w, 8), random(h * w, 9)];
         let with = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("pool");
-            pool.install(|| Autocorrelation::new(&planes, (h, w)).values().to_vec())
+            pool.install(|| Autocorrelation::new(&planes, (h, w)).values())
         };
         let one = with(1);
         assert!(one == with(2) && one == with(5));
