@@ -69,9 +69,9 @@ impl Lattice {
     }
 
     /// The same for what can be laid a little askew: pieces that are fitted to each other, which share
-    /// out a lean of the lattice as they do the scaling, of at most `most`.
+    /// out a lean of the lattice as they do the scaling, of at most `most`. A lean is seen sooner.
     pub(super) fn snap_pieces(&self, width: usize, height: usize, most: f64) -> Option<Snap> {
-        snap::snap(self.basis(), (width, height), most, most)
+        snap::snap(self.basis(), (width, height), most, MOST_SCALING)
     }
 
     /// Rows of the lattice that a tile of this size leads over whole numbers of, where it repeats.
