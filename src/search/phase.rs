@@ -13,7 +13,8 @@ const TOLERANCE_PIXELS: f64 = 1.0;
 
 /// A lattice in a source and the same lattice in the output, where it may be a little stretched: a
 /// match is in phase if it lies at the same place of a cell as its pixel does. Or only rows of a
-/// lattice: then at the same distance from a row, wherever along it.
+/// lattice: then at the same distance from a row, wherever along it; and of two families of rows, from
+/// either.
 #[derive(Debug, Clone, Copy)]
 pub struct Phase {
     /// The displacements in the source, in its pixels, by which a match stays in phase; of rows the
@@ -36,20 +37,26 @@ impl Phase {
         Some(Self::within(shorter, source, [dual(source)?, dual(output)?], patch))
     }
 
-    /// Rows of which the displacement v leads over `source` . v in the source, and over `output` . v in
-    /// the output. `None` if there are none.
-    pub fn rows(source: Vector, output: Vector, patch: usize) -> Option<Self> {
-        let square = dot(source, source);
-        let across = source.map(|v| v / square);
-        let whole = |rows: Vector| [rows, [0.0; 2]];
-        (square > 1e-18).then(|| {
-            Self::within(
-                square.sqrt().recip(),
-                whole(across),
-                [whole(source), whole(output)],
-                patch,
-            )
-        })
+    /// Rows of which the displacement v leads over the first vector . v in the source, and over the
+    /// second . v in the output; of one family, or of two. `None` if there are none, or both parallel.
+    pub fn rows(rows: &[(Vector, Vector)], patch: usize) -> Option<Self> {
+        let none = [0.0; 2];
+        let (across, source, output) = match *rows {
+            [(source, output)] => {
+                let square = dot(source, source);
+                let across = [source.map(|v| v / square), none];
+                (square > 1e-18).then_some((across, [source, none], [output, none]))?
+            }
+            [(a, in_a), (b, in_b)] => {
+                let area = a[0] * b[1] - a[1] * b[0];
+                let across = [[b[1] / area, -b[0] / area], [-a[1] / area, a[0] / area]];
+                (area.abs() > 1e-18).then_some((across, [a, b], [in_a, in_b]))?
+            }
+            _ => return None,
+        };
+        // The closest rows.
+        let most = source.map(|k| dot(k, k).sqrt()).into_iter().fold(0.0, f64::max);
+        Some(Self::within(most.recip(), across, [source, output], patch))
     }
 
     fn within(
@@ -160,7 +167,7 @@ mod tests {
             // Rows with this normal; the output's are stretched and lean a little.
             let normal = [angle.cos() / apart, angle.sin() / apart];
             let output = [1.02 * normal[0] + 0.01 / apart, 0.98 * normal[1]];
-            let phase = Phase::rows(normal, output, 11).expect("rows");
+            let phase = Phase::rows(&[(normal, output)], 11).expect("rows");
             let source = source();
             let near = phase.near(&source, (y, x), Pos::new(py, px));
             let row = |pos: Pos| (pos.x() as f64 + 5.0) * normal[0] + (pos.y() as f64 + 5.0) * normal[1];
@@ -178,6 +185,20 @@ mod tests {
     }
 
     #[test]
+    fn two_families_of_rows_are_the_lattice_of_their_crossings() {
+        let lattice = [[40.0, 3.0], [11.0, 30.0]];
+        let whole = Phase::new(lattice, lattice, 11).expect("a lattice");
+        let families = dual(lattice).expect("a lattice").map(|k| (k, k));
+        let rows = Phase::rows(&families, 11).expect("rows");
+        let source = source();
+        for (i, (y, x)) in [(0, 0), (17, 90), (133, 41), (88, 88)].into_iter().enumerate() {
+            let pos = Pos::new(20 * i + 63, 25 * i + 71);
+            let [a, b] = [&whole, &rows].map(|phase| phase.near(&source, (y, x), pos));
+            assert!(a.y().abs_diff(b.y()) <= 1 && a.x().abs_diff(b.x()) <= 1, "{a:?}, {b:?}");
+        }
+    }
+
+    #[test]
     fn neighbours_in_phase_agree() {
         let phase = Phase::new([[40.0, 0.0], [20.0, 30.0]], [[40.0, 0.0], [20.0, 30.0]], 11);
         let phase = phase.expect("a lattice");
@@ -186,6 +207,8 @@ mod tests {
         let beside = pos.shifted(1, 1, &source).expect("inside");
         assert_eq!(phase.near(&source, (51, 71), beside), beside);
         assert!(Phase::new([[4.0, 2.0], [2.0, 1.0]], [[4.0, 0.0], [0.0, 4.0]], 11).is_none());
-        assert!(Phase::rows([0.0; 2], [0.0, 0.1], 11).is_none());
+        assert!(Phase::rows(&[([0.0; 2], [0.0, 0.1])], 11).is_none());
+        let parallel = [([0.1, 0.0], [0.1, 0.0]), ([0.2, 0.0], [0.2, 0.0])];
+        assert!(Phase::rows(&parallel, 11).is_none() && Phase::rows(&[], 11).is_none());
     }
 }

@@ -75,7 +75,7 @@ impl Lattice {
     }
 
     /// Rows of the lattice that a tile of this size leads over whole numbers of, where it repeats.
-    pub(super) fn rows(&self, width: usize, height: usize, repeats: [bool; 2]) -> Option<Rows> {
+    pub(super) fn rows(&self, width: usize, height: usize, repeats: [bool; 2]) -> Vec<Rows> {
         snap::rows(self.basis(), (width, height), repeats)
     }
 

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use crate::analyze::lattice::snap::{MOST_SCALING, MOST_SCALING_ASKED, Rows, Snap};
+use crate::analyze::lattice::snap::{MOST_SCALING, MOST_SCALING_ASKED, Snap};
 use crate::analyze::{stationarity, texture};
 use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
@@ -373,11 +373,11 @@ fn follow(
     let whole = nearest.map_or(String::new(), |s| format!("; {}x{} does", s.width, s.height));
     let wrap = wrap(params);
     let rows = lattice.rows(width, height, [wrap.x, wrap.y]);
-    let along = if rows.is_some() { "whole rows, but along them " } else { "" };
+    let along = if rows.is_empty() { "" } else { "whole rows, but along them " };
     notes.push(format!(
         "{vectors}; {width}x{height} holds {along}no whole number of them, so some are cut{whole}"
     ));
-    Ok(rows.map(|Rows { frequency, of_output }| (size, Periods::Rows { frequency, of_output })))
+    Ok((!rows.is_empty()).then_some((size, Periods::Rows(rows))))
 }
 
 /// Checks that the dial has something to turn, and that nothing else turns it.

@@ -115,13 +115,13 @@ const COEFFICIENTS: [[f64; 2]; 8] = [
     [1.0, -2.0],
 ];
 
-/// The widest rows of the lattice that fit into a rectangle of which only the axes with `repeats` (to the
-/// right, downwards) have to hold whole numbers of them; `None` if all would have to be turned or
+/// The one or two widest families of rows of the lattice that fit into a rectangle of which only the axes with `repeats` (to the
+/// right, downwards) have to hold whole numbers of them; none if all would have to be turned or
 /// moved together by more than [`MOST_SCALING`]. The wider rows lie apart, the closer their points, and the
 /// plainer they are seen. Looked at are the rows along either vector, along either diagonal of the
 /// cell and of two cells; for a reduced basis there are no wider ones.
-pub fn rows(basis: Basis, size: (usize, usize), repeats: [bool; 2]) -> Option<Rows> {
-    let dual = dual(basis)?;
+pub fn rows(basis: Basis, size: (usize, usize), repeats: [bool; 2]) -> Vec<Rows> {
+    let Some(dual) = dual(basis) else { return Vec::new() };
     let sides = [size.0 as f64, size.1 as f64];
     let mut frequencies = COEFFICIENTS.map(|[a, b]| combined(dual, a, b));
     frequencies.sort_by(|&a, &b| dot(a, a).total_cmp(&dot(b, b)));
@@ -136,7 +136,8 @@ pub fn rows(basis: Basis, size: (usize, usize), repeats: [bool; 2]) -> Option<Ro
         fits.then_some(Rows { frequency, of_output })
     };
     let seen = |k: &Vector| NARROWEST * NARROWEST * dot(*k, *k) <= widest;
-    frequencies.into_iter().filter(seen).find_map(fitted)
+    // No two of them are parallel.
+    frequencies.into_iter().filter(seen).filter_map(fitted).take(2).collect()
 }
 
 #[cfg(test)]
@@ -214,7 +215,7 @@ mod tests {
         // Courses of bricks, 21 apart, each shifted by half a brick.
         let bricks = [[37.0, 0.0], [18.5, 21.0]];
         let courses = |width, height, repeats| {
-            let rows = rows(bricks, (width, height), repeats)?;
+            let rows = *rows(bricks, (width, height), repeats).first()?;
             assert!(rows.frequency[0].abs() < 1e-12, "{rows:?}");
             assert!((rows.frequency[1].abs() - 1.0 / 21.0).abs() < 1e-12, "{rows:?}");
             Some(rows.of_output.map(f64::abs))
@@ -224,7 +225,13 @@ mod tests {
         assert_eq!(courses(83, 86, [true; 2]), Some([0.0, 4.0]));
         assert_eq!(courses(83, 94, [true; 2]), None, "four and a half");
         assert_eq!(courses(83, 94, [true, false]), Some([0.0, 94.0 / 21.0]), "nothing below");
-        assert_eq!(rows([[4.0, 2.0], [2.0, 1.0]], (40, 40), [true; 2]), None, "no lattice");
+        assert_eq!(rows([[4.0, 2.0], [2.0, 1.0]], (40, 40), [true; 2]), [], "no lattice");
+        // Five chequers either way: somewhere two of a colour meet.
+        let chequers = rows([[100.0, 100.0], [100.0, -100.0]], (512, 512), [true; 2]);
+        let mut counts: Vec<_> =
+            chequers.iter().map(|r| r.of_output.map(|n| n.abs() as i32)).collect();
+        counts.sort_unstable();
+        assert_eq!(counts, [[0, 5], [5, 0]]);
         // By trying all numbers of rows.
         let mut found = 0;
         for basis in [bricks, [[40.0, 1.5], [-3.0, 55.0]], [[30.0, 30.0], [31.0, -29.0]]] {
@@ -256,7 +263,7 @@ mod tests {
                         }
                     }
                 }
-                let got = rows(basis, (width, height), [true; 2]);
+                let got = rows(basis, (width, height), [true; 2]).first().copied();
                 assert_eq!(got.is_some(), widest.is_some(), "{basis:?} {width}x{height}");
                 if let Some((Rows { frequency: [x, y], of_output: [m, n] }, want)) = got.zip(widest)
                 {

@@ -10,6 +10,7 @@ mod level;
 
 use rayon::prelude::*;
 
+use crate::analyze::lattice::snap::Rows;
 use crate::base::ctx::Ctx;
 use crate::base::error::Result;
 use crate::image::mask::Mask;
@@ -26,7 +27,7 @@ use crate::search::place_cost::PlaceCost;
 use crate::search::seams;
 use crate::search::source::Source;
 use crate::search::vote::{Votes, vote};
-use crate::signal::basis::{Basis, Vector};
+use crate::signal::basis::Basis;
 use crate::signal::histogram::{Distribution, SOFT_BITS};
 use crate::signal::measure::Statistic;
 use crate::signal::resample::resized;
@@ -84,7 +85,7 @@ pub struct Plan {
 }
 
 /// A lattice in the photo, and how the output's axes are made of it.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub enum Periods {
     /// The whole lattice.
     Lattice {
@@ -93,13 +94,8 @@ pub enum Periods {
         /// Coefficients of the displacements by the output's width and by its height.
         of_output: [[i64; 2]; 2],
     },
-    /// Rows of the lattice alone: along them nothing is held.
-    Rows {
-        /// Rows a pixel of the photo: to the right and downwards.
-        frequency: Vector,
-        /// Rows that the output's width leads over, and its height.
-        of_output: [f64; 2],
-    },
+    /// One or two families of its rows alone: along one nothing is held.
+    Rows(Vec<Rows>),
 }
 
 impl Periods {
@@ -113,7 +109,7 @@ impl Periods {
         let view = source.atlas.views()[0].size;
         let (sy, sx) = (view.0 as f64 / photo.0 as f64, view.1 as f64 / photo.1 as f64);
         let (w, h) = (size.1 as f64, size.0 as f64);
-        match *self {
+        match self {
             Self::Lattice { vectors, of_output } => {
                 let vectors = vectors.map(|[x, y]| [x * sx, y * sy]);
                 // Cells of the output: its sides are whole combinations of them.
@@ -125,8 +121,12 @@ impl Periods {
                 let output = [[d * w / n, -b * h / n], [-c * w / n, a * h / n]];
                 Phase::new(vectors, output, source.patch)
             }
-            Self::Rows { frequency: [x, y], of_output: [a, b] } => {
-                Phase::rows([x / sx, y / sy], [a / w, b / h], source.patch)
+            Self::Rows(rows) => {
+                let family = |rows: &Rows| {
+                    let ([x, y], [a, b]) = (rows.frequency, rows.of_output);
+                    ([x / sx, y / sy], [a / w, b / h])
+                };
+                Phase::rows(&rows.iter().map(family).collect::<Vec<_>>(), source.patch)
             }
         }
     }
@@ -287,7 +287,10 @@ fn synthesize(
         if let Some(kept) = &kept {
             kept.hold(&mut f);
         }
-        let phase = plan.periods.and_then(|p| p.at_level(exemplar.sizes[0], (h, w), &level.source));
+        let phase = plan
+            .periods
+            .as_ref()
+            .and_then(|p| p.at_level(exemplar.sizes[0], (h, w), &level.source));
         if let Some(phase) = &phase {
             f = f.in_phase(phase, &level.source);
         }
