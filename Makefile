@@ -12,6 +12,7 @@ BENCH ?=
 EXEMPLARS ?= ../shared/exemplars
 GALLERY ?=
 QUALITY ?=
+LATTICES ?=
 
 .DEFAULT_GOAL := help
 .PHONY: help setup demo test test-rust test-python lint format gallery quality lattices extracts regular-gallery readme-pictures bench bench-peers bench-record wheel ci clean
@@ -73,8 +74,8 @@ gallery: setup ## Tile every exemplar and write contact sheets, in gallery/ (GAL
 quality: setup ## Print costs, sharpness and verbatim blocks of tiles of EXEMPLARS against the baseline.
 	$(BIN)/python docs/quality.py "$(EXEMPLARS)" $(QUALITY)
 
-lattices: setup ## Print which lattices of EXEMPLARS are found and refused; draw them, in lattices/.
-	$(BIN)/python docs/lattices.py "$(EXEMPLARS)"
+lattices: setup ## Print which lattices of EXEMPLARS are found and refused; draw them, in lattices/ (LATTICES=--variants).
+	$(BIN)/python docs/lattices.py "$(EXEMPLARS)" $(LATTICES)
 
 extracts: setup ## Extract the tiles of EXEMPLARS that repeat; show them repeated, in extracts/.
 	$(BIN)/python docs/extracts.py "$(EXEMPLARS)"

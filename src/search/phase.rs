@@ -2,24 +2,27 @@
 
 use crate::search::field::Pos;
 use crate::search::source::Source;
-use crate::signal::basis::{Basis, combined, dot};
+use crate::signal::basis::{Basis, Vector, combined, dot, dual};
 
-/// How far from its place in the cell a match may lie, as a share of the shorter vector: bricks are
-/// not laid to the pixel.
+/// How far from its place in the cell a match may lie, as a share of the shorter vector, or of the
+/// distance of rows: bricks are not laid to the pixel.
 const TOLERANCE: f64 = 0.03;
 
 /// The same in pixels, at least: positions are whole pixels.
 const TOLERANCE_PIXELS: f64 = 1.0;
 
 /// A lattice in a source and the same lattice in the output, where it may be a little stretched: a
-/// match is in phase if it lies at the same place of a cell as its pixel does.
+/// match is in phase if it lies at the same place of a cell as its pixel does. Or only rows of a
+/// lattice: then at the same distance from a row, wherever along it; and of two families of rows, from
+/// either.
 #[derive(Debug, Clone, Copy)]
 pub struct Phase {
-    /// The lattice's vectors in the source, in its pixels.
+    /// The displacements in the source, in its pixels, by which a match stays in phase; of rows the
+    /// one across them, and none.
     source: Basis,
     /// What gives the coefficients of a place in the source, and of one in the output.
-    of_source: Inverse,
-    of_output: Inverse,
+    of_source: Basis,
+    of_output: Basis,
     /// From a patch's corner to its middle.
     half: f64,
     /// Square of the distance that counts as in phase.
@@ -31,14 +34,40 @@ impl Phase {
     /// patches of side `patch`. `None` if two vectors are parallel.
     pub fn new(source: Basis, output: Basis, patch: usize) -> Option<Self> {
         let shorter = source.map(|v| dot(v, v).sqrt()).into_iter().fold(f64::MAX, f64::min);
-        let tolerance = (TOLERANCE * shorter).max(TOLERANCE_PIXELS);
-        Some(Self {
-            source,
-            of_source: inverse(source)?,
-            of_output: inverse(output)?,
-            half: (patch / 2) as f64,
-            tolerance: tolerance * tolerance,
-        })
+        Some(Self::within(shorter, source, [dual(source)?, dual(output)?], patch))
+    }
+
+    /// Rows of which the displacement v leads over the first vector . v in the source, and over the
+    /// second . v in the output; of one family, or of two. `None` if there are none, or both parallel.
+    pub fn rows(rows: &[(Vector, Vector)], patch: usize) -> Option<Self> {
+        let none = [0.0; 2];
+        let (across, source, output) = match *rows {
+            [(source, output)] => {
+                let square = dot(source, source);
+                let across = [source.map(|v| v / square), none];
+                (square > 1e-18).then_some((across, [source, none], [output, none]))?
+            }
+            [(a, in_a), (b, in_b)] => {
+                let area = a[0] * b[1] - a[1] * b[0];
+                let across = [[b[1] / area, -b[0] / area], [-a[1] / area, a[0] / area]];
+                (area.abs() > 1e-18).then_some((across, [a, b], [in_a, in_b]))?
+            }
+            _ => return None,
+        };
+        // The closest rows.
+        let most = source.map(|k| dot(k, k).sqrt()).into_iter().fold(0.0, f64::max);
+        Some(Self::within(most.recip(), across, [source, output], patch))
+    }
+
+    fn within(
+        period: f64,
+        source: Basis,
+        [of_source, of_output]: [Basis; 2],
+        patch: usize,
+    ) -> Self {
+        let tolerance = (TOLERANCE * period).max(TOLERANCE_PIXELS);
+        let half = (patch / 2) as f64;
+        Self { source, of_source, of_output, half, tolerance: tolerance * tolerance }
     }
 
     /// The place in phase with output pixel (`y`, `x`) that is nearest to `pos` (nearly: by rounding
@@ -46,8 +75,8 @@ impl Phase {
     #[inline(never)]
     pub fn near(&self, source: &Source, (y, x): (usize, usize), pos: Pos) -> Pos {
         let center = [pos.x() as f64 + self.half, pos.y() as f64 + self.half];
-        let there = coefficients(self.of_source, center);
-        let here = coefficients(self.of_output, [x as f64, y as f64]);
+        let there = self.of_source.map(|k| dot(k, center));
+        let here = self.of_output.map(|k| dot(k, [x as f64, y as f64]));
         // By how much of a cell it is off.
         let off: [f64; 2] = std::array::from_fn(|k| {
             let apart = there[k] - here[k];
@@ -70,19 +99,6 @@ impl Phase {
         }
         pos
     }
-}
-
-/// A matrix row by row. Like [`signal::basis::coefficients`](crate::signal::basis::coefficients), but
-/// divided once for all places.
-type Inverse = [[f64; 2]; 2];
-
-fn inverse([[ax, ay], [bx, by]]: Basis) -> Option<Inverse> {
-    let area = ax * by - ay * bx;
-    (area.abs() > 1e-9).then(|| [[by / area, -bx / area], [-ay / area, ax / area]])
-}
-
-fn coefficients([a, b]: Inverse, [x, y]: [f64; 2]) -> [f64; 2] {
-    [a[0] * x + a[1] * y, b[0] * x + b[1] * y]
 }
 
 #[cfg(test)]
@@ -141,6 +157,47 @@ mod tests {
         }
     }
 
+    proptest! {
+        #[test]
+        fn in_rows_only_the_way_across_is_held(
+            (y, x) in (0..160usize, 0..160usize),
+            (py, px) in (0..190usize, 0..230usize),
+            (angle, apart) in (-3.2..3.2f64, 12.0..40.0f64),
+        ) {
+            // Rows with this normal; the output's are stretched and lean a little.
+            let normal = [angle.cos() / apart, angle.sin() / apart];
+            let output = [1.02 * normal[0] + 0.01 / apart, 0.98 * normal[1]];
+            let phase = Phase::rows(&[(normal, output)], 11).expect("rows");
+            let source = source();
+            let near = phase.near(&source, (y, x), Pos::new(py, px));
+            let row = |pos: Pos| (pos.x() as f64 + 5.0) * normal[0] + (pos.y() as f64 + 5.0) * normal[1];
+            let off = row(near) - (x as f64 * output[0] + y as f64 * output[1]);
+            // Rounded to pixels.
+            prop_assert!((off - off.round()).abs() * apart <= 1.25, "{near:?} is off by {off}");
+            let moved = [near.x() as f64 - px as f64, near.y() as f64 - py as f64];
+            let along = (moved[1] * normal[0] - moved[0] * normal[1]) * apart;
+            prop_assert!(along.abs() <= 1.0, "{moved:?} leads along the row");
+            let inner = (40..150).contains(&py) && (40..190).contains(&px);
+            let most = if inner { 0.5 } else { 1.5 };
+            prop_assert!(moved[0].hypot(moved[1]) <= most * apart + 1.0, "{moved:?}");
+            prop_assert_eq!(phase.near(&source, (y, x), near), near);
+        }
+    }
+
+    #[test]
+    fn two_families_of_rows_are_the_lattice_of_their_crossings() {
+        let lattice = [[40.0, 3.0], [11.0, 30.0]];
+        let whole = Phase::new(lattice, lattice, 11).expect("a lattice");
+        let families = dual(lattice).expect("a lattice").map(|k| (k, k));
+        let rows = Phase::rows(&families, 11).expect("rows");
+        let source = source();
+        for (i, (y, x)) in [(0, 0), (17, 90), (133, 41), (88, 88)].into_iter().enumerate() {
+            let pos = Pos::new(20 * i + 63, 25 * i + 71);
+            let [a, b] = [&whole, &rows].map(|phase| phase.near(&source, (y, x), pos));
+            assert!(a.y().abs_diff(b.y()) <= 1 && a.x().abs_diff(b.x()) <= 1, "{a:?}, {b:?}");
+        }
+    }
+
     #[test]
     fn neighbours_in_phase_agree() {
         let phase = Phase::new([[40.0, 0.0], [20.0, 30.0]], [[40.0, 0.0], [20.0, 30.0]], 11);
@@ -150,5 +207,8 @@ mod tests {
         let beside = pos.shifted(1, 1, &source).expect("inside");
         assert_eq!(phase.near(&source, (51, 71), beside), beside);
         assert!(Phase::new([[4.0, 2.0], [2.0, 1.0]], [[4.0, 0.0], [0.0, 4.0]], 11).is_none());
+        assert!(Phase::rows(&[([0.0; 2], [0.0, 0.1])], 11).is_none());
+        let parallel = [([0.1, 0.0], [0.1, 0.0]), ([0.2, 0.0], [0.2, 0.0])];
+        assert!(Phase::rows(&parallel, 11).is_none() && Phase::rows(&[], 11).is_none());
     }
 }

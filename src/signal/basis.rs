@@ -21,6 +21,13 @@ pub fn area(basis: Basis) -> f64 {
     (basis[0][0] * basis[1][1] - basis[0][1] * basis[1][0]).abs()
 }
 
+/// The dual basis: the products of its vectors with a displacement are the displacement's
+/// [`coefficients`]. `None` if the vectors are parallel.
+pub fn dual([[ax, ay], [bx, by]]: Basis) -> Option<Basis> {
+    let area = ax * by - ay * bx;
+    (area.abs() > 1e-9).then(|| [[by / area, -bx / area], [-ay / area, ax / area]])
+}
+
 /// The coefficients of a displacement: what [`combined`] makes it of.
 pub fn coefficients(basis: Basis, v: Vector) -> Vector {
     let [u, w] = basis;
@@ -91,5 +98,9 @@ mod tests {
         let basis = [[29.3, 1.3], [-0.9, 44.7]];
         let [a, b] = coefficients(basis, combined(basis, 3.0, -7.5));
         assert!((a - 3.0).abs() < 1e-12 && (b + 7.5).abs() < 1e-12);
+        let [first, second] = dual(basis).expect("not parallel");
+        let v = combined(basis, 3.0, -7.5);
+        assert!((dot(first, v) - 3.0).abs() < 1e-12 && (dot(second, v) + 7.5).abs() < 1e-12);
+        assert_eq!(dual([[4.0, 2.0], [2.0, 1.0]]), None);
     }
 }

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::analyze::lattice::snap::{self, MOST_SCALING, Snap};
+use crate::analyze::lattice::snap::{self, MOST_SCALING, Rows, Snap};
 use crate::analyze::lattice::{self, reduced_size};
 use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
@@ -65,13 +65,18 @@ impl Lattice {
     /// little the photo must be scaled for it; `None` if there is none within half and twice that
     /// size. See [`Snap`].
     pub fn snap(&self, width: usize, height: usize) -> Option<Snap> {
-        snap::snap(self.basis(), (width, height), 0.0)
+        snap::snap(self.basis(), (width, height), MOST_SCALING, 0.0)
     }
 
     /// The same for what can be laid a little askew: pieces that are fitted to each other, which share
-    /// out a lean of the lattice as they do the scaling.
-    pub(super) fn snap_pieces(&self, width: usize, height: usize) -> Option<Snap> {
-        snap::snap(self.basis(), (width, height), MOST_SCALING)
+    /// out a lean of the lattice as they do the scaling, of at most `most`. A lean is seen sooner.
+    pub(super) fn snap_pieces(&self, width: usize, height: usize, most: f64) -> Option<Snap> {
+        snap::snap(self.basis(), (width, height), most, MOST_SCALING)
+    }
+
+    /// Rows of the lattice that a tile of this size leads over whole numbers of, where it repeats.
+    pub(super) fn rows(&self, width: usize, height: usize, repeats: [bool; 2]) -> Vec<Rows> {
+        snap::rows(self.basis(), (width, height), repeats)
     }
 
     /// The lattice drawn over a picture as large as the photo: bright lines with dark rims, through

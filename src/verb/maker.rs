@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use crate::analyze::lattice::snap::{MOST_SCALING, MOST_SCALING_ASKED, Snap};
 use crate::analyze::{stationarity, texture};
 use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
@@ -341,17 +342,36 @@ fn follow(
          {confidence:.2})"
     );
     let fixed = params.size != Size::Auto || inputs.redo.is_some();
-    let snap = lattice.snap_pieces(width, height);
-    let Some(snap) = snap.filter(|s| !fixed || (s.width, s.height) == (width, height)) else {
-        let whole = snap.map_or(String::new(), |s| format!("; {}x{} does", s.width, s.height));
-        notes.push(format!(
-            "{vectors}; {width}x{height} holds no whole number of them, so some are cut{whole}"
-        ));
-        return Ok(None);
+    let size = (width, height);
+    let nearest = lattice.snap_pieces(width, height, MOST_SCALING);
+    let exact = |snap: &Snap| (snap.width, snap.height) == size;
+    let held = if fixed {
+        let asked = lattice.snap_pieces(width, height, MOST_SCALING_ASKED);
+        nearest.filter(exact).or(asked.filter(exact))
+    } else {
+        nearest
     };
-    notes.push(format!("{vectors}; a tile of {}x{} holds whole periods", snap.width, snap.height));
-    let periods = Periods { vectors: [lattice.v1, lattice.v2], of_output: snap.periods };
-    Ok(Some(((snap.width, snap.height), periods)))
+    if let Some(snap) = held {
+        let off = (snap.scale_x - 1.0).abs().max((snap.scale_y - 1.0).abs());
+        let by = if off > MOST_SCALING {
+            format!(", scaled by up to {:.0} %", 100.0 * off)
+        } else {
+            String::new()
+        };
+        let (w, h) = (snap.width, snap.height);
+        notes.push(format!("{vectors}; a tile of {w}x{h} holds whole periods{by}"));
+        let vectors = [lattice.v1, lattice.v2];
+        let periods = Periods::Lattice { vectors, of_output: snap.periods };
+        return Ok(Some(((snap.width, snap.height), periods)));
+    }
+    let whole = nearest.map_or(String::new(), |s| format!("; {}x{} does", s.width, s.height));
+    let wrap = wrap(params);
+    let rows = lattice.rows(width, height, [wrap.x, wrap.y]);
+    let along = if rows.is_empty() { "" } else { "whole rows, but along them " };
+    notes.push(format!(
+        "{vectors}; {width}x{height} holds {along}no whole number of them, so some are cut{whole}"
+    ));
+    Ok((!rows.is_empty()).then_some((size, Periods::Rows(rows))))
 }
 
 /// Checks that the dial has something to turn, and that nothing else turns it.

@@ -347,16 +347,56 @@ mod following {
     #[test]
     fn a_size_that_cuts_bricks_is_made_and_said() {
         let photo = wall();
-        // Two bricks and a half.
-        let size = Size::Pixels { width: 92, height: 84 };
+        // Two bricks and a quarter, and four courses and a half.
+        let size = Size::Pixels { width: 83, height: 94 };
         let params = TileParams { size, ..Default::default() };
         let tile = made(&photo, &params, 2);
-        assert_eq!(tile.report.tile_size, (92, 84));
+        assert_eq!(tile.report.tile_size, (83, 94));
         let said = tile.report.notes.iter().find(|note| note.contains("some are cut"));
         assert!(said.is_some_and(|note| note.contains("x84 does")), "{:?}", tile.report.notes);
         let off = made(&photo, &TileParams { lattice: Follow::Off, ..params }, 2);
         assert!(off.picture.samples() == tile.picture.samples());
         assert!(off.report.notes.is_empty());
+    }
+
+    #[test]
+    fn courses_stay_in_step_where_only_they_fit() {
+        let photo = wall();
+        // The share of pixels whose match lies as far from a course as they do, within two pixels.
+        let in_step = |tile: &Tile| {
+            let map = tile.source_map.as_ref().expect("a source map");
+            let stretch = map.height() as f64 / ((map.height() as f64 / 21.0).round() * 21.0);
+            let near = |(i, &[y, _]): (usize, &[u32; 2])| {
+                let off = (f64::from(y) - (i / map.width()) as f64 / stretch) / 21.0;
+                (off - off.round()).abs() * 21.0 <= 2.0
+            };
+            let positions = map.positions();
+            positions.iter().enumerate().filter(|&p| near(p)).count() as f64
+                / positions.len() as f64
+        };
+        // Two bricks and a half; four courses a little stretched, or five, which turns the bond over.
+        for (width, height) in [(92, 86), (92, 105)] {
+            let size = Size::Pixels { width, height };
+            let params = TileParams { size, ..Default::default() };
+            let tile = made(&photo, &params, 2);
+            assert_eq!(tile.report.tile_size, (width, height));
+            let said = |n: &String| n.contains("whole rows") && n.contains("some are cut");
+            assert!(tile.report.notes.iter().any(said), "{:?}", tile.report.notes);
+            let off = made(&photo, &TileParams { lattice: Follow::Off, ..params.clone() }, 2);
+            let (held, free) = (in_step(&tile), in_step(&off));
+            assert!(held > 0.9, "{width}x{height}: {held} in step, {free} without");
+            assert!(free < 0.8, "{width}x{height}: {free} in step without");
+            for threads in [1, 5] {
+                let again = made(&photo, &params, threads);
+                assert!(again.picture.samples() == tile.picture.samples(), "{threads} threads");
+            }
+        }
+        // Where nothing repeats downwards, any height will do.
+        let size = Size::Pixels { width: 92, height: 94 };
+        let params = TileParams { size, axis: texforge::Axis::X, ..Default::default() };
+        let tile = made(&photo, &params, 2);
+        let said = |n: &String| n.contains("whole rows");
+        assert!(tile.report.notes.iter().any(said), "{:?}", tile.report.notes);
     }
 
     #[test]

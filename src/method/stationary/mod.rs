@@ -10,6 +10,7 @@ mod level;
 
 use rayon::prelude::*;
 
+use crate::analyze::lattice::snap::Rows;
 use crate::base::ctx::Ctx;
 use crate::base::error::Result;
 use crate::image::mask::Mask;
@@ -84,12 +85,17 @@ pub struct Plan {
 }
 
 /// A lattice in the photo, and how the output's axes are made of it.
-#[derive(Debug, Clone, Copy)]
-pub struct Periods {
-    /// Vectors in pixels of the photo, each to the right and downwards.
-    pub vectors: Basis,
-    /// Coefficients of the displacements by the output's width and by its height.
-    pub of_output: [[i64; 2]; 2],
+#[derive(Debug, Clone)]
+pub enum Periods {
+    /// The whole lattice.
+    Lattice {
+        /// Vectors in pixels of the photo, each to the right and downwards.
+        vectors: Basis,
+        /// Coefficients of the displacements by the output's width and by its height.
+        of_output: [[i64; 2]; 2],
+    },
+    /// One or two families of its rows alone: along one nothing is held.
+    Rows(Vec<Rows>),
 }
 
 impl Periods {
@@ -102,15 +108,27 @@ impl Periods {
     ) -> Option<Phase> {
         let view = source.atlas.views()[0].size;
         let (sy, sx) = (view.0 as f64 / photo.0 as f64, view.1 as f64 / photo.1 as f64);
-        let vectors = self.vectors.map(|[x, y]| [x * sx, y * sy]);
-        // Cells of the output: its sides are whole combinations of them.
-        let [[a, b], [c, d]] = self.of_output.map(|row| row.map(|n| n as f64));
-        let (w, h, n) = (size.1 as f64, size.0 as f64, a * d - b * c);
-        if n == 0.0 {
-            return None;
+        let (w, h) = (size.1 as f64, size.0 as f64);
+        match self {
+            Self::Lattice { vectors, of_output } => {
+                let vectors = vectors.map(|[x, y]| [x * sx, y * sy]);
+                // Cells of the output: its sides are whole combinations of them.
+                let [[a, b], [c, d]] = of_output.map(|row| row.map(|n| n as f64));
+                let n = a * d - b * c;
+                if n == 0.0 {
+                    return None;
+                }
+                let output = [[d * w / n, -b * h / n], [-c * w / n, a * h / n]];
+                Phase::new(vectors, output, source.patch)
+            }
+            Self::Rows(rows) => {
+                let family = |rows: &Rows| {
+                    let ([x, y], [a, b]) = (rows.frequency, rows.of_output);
+                    ([x / sx, y / sy], [a / w, b / h])
+                };
+                Phase::rows(&rows.iter().map(family).collect::<Vec<_>>(), source.patch)
+            }
         }
-        let output = [[d * w / n, -b * h / n], [-c * w / n, a * h / n]];
-        Phase::new(vectors, output, source.patch)
     }
 }
 
@@ -269,7 +287,10 @@ fn synthesize(
         if let Some(kept) = &kept {
             kept.hold(&mut f);
         }
-        let phase = plan.periods.and_then(|p| p.at_level(exemplar.sizes[0], (h, w), &level.source));
+        let phase = plan
+            .periods
+            .as_ref()
+            .and_then(|p| p.at_level(exemplar.sizes[0], (h, w), &level.source));
         if let Some(phase) = &phase {
             f = f.in_phase(phase, &level.source);
         }

@@ -371,7 +371,7 @@ fn cut(
         uniformity: TileParams::default().uniformity,
         rarity: 0.0,
         // The band comes from the same place of other periods.
-        periods: Some(Periods {
+        periods: Some(Periods::Lattice {
             vectors: [[tw as f64, 0.0], [0.0, th as f64]],
             of_output: [[1, 0], [0, 1]],
         }),

@@ -129,7 +129,7 @@ pub(super) fn sized(
             return Ok(free(axis, length));
         }
         let turned = basis.map(|[x, y]| if axis == 0 { [x, y] } else { [y, x] });
-        let near = snap::side(turned, length, MOST_SCALING);
+        let near = snap::side(turned, length, MOST_SCALING, MOST_SCALING);
         if let Some(s) = near.filter(|s| params.size == Size::Auto || s.length == length) {
             let [a, b] = s.periods.map(|n| n as f64);
             return Ok((s.length, combined(basis, a, b)));
