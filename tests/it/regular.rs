@@ -455,7 +455,7 @@ mod program {
                 1,
                 "smaller ones",
             ),
-            (&["wall.png", "-o", "a.xyz", "--lattice", LATTICE][..], 2, "a.xyz"),
+            (&["wall.png", "-o", "a.xyz", "--lattice", LATTICE][..], 1, "a.xyz"),
             (&["wall.png", "-o", "-", "--json"][..], 2, "`json`"),
         ] {
             let output = run(&folder, args);
