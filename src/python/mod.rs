@@ -258,7 +258,7 @@ type SnapOut = (usize, usize, [f64; 2], [[i64; 2]; 2], [f64; 2]);
 #[pyfunction]
 #[pyo3(signature = (*, v1, v2, width, height))]
 fn lattice_snap(v1: [f64; 2], v2: [f64; 2], width: usize, height: usize) -> Option<SnapOut> {
-    let snap = snap::snap([v1, v2], (width, height), 0.0)?;
+    let snap = snap::snap([v1, v2], (width, height), snap::MOST_SCALING, 0.0)?;
     Some((snap.width, snap.height, [snap.scale_x, snap.scale_y], snap.periods, snap.misfit))
 }
 

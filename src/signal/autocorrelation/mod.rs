@@ -49,7 +49,7 @@ impl Autocorrelation {
     /// value that lies within 1e-13 of a step.
     ///
     /// # Cost
-    /// O(n log n); about 110 bytes a pixel while it works.
+    /// O(n log n); about 45 bytes a pixel while it works.
     ///
     /// # Panics
     /// If there are no planes, more than three, or one has another size.
