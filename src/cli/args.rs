@@ -111,7 +111,7 @@ pub(super) fn command() -> Command {
 }
 
 fn tile() -> Command {
-    Command::new(TileParams::VERB)
+    let command = Command::new(TileParams::VERB)
         .about("Turns a photo into a stationary tile: no seam, and no blob that gives the repetition away.")
         .before_help(TILE_EXAMPLES)
         .arg(Sources::photo())
@@ -161,7 +161,14 @@ fn tile() -> Command {
             file("save-source-map", "FILE.exr", "Also write which photo pixel each tile pixel is, for `texforge apply`")
                 .long("save-source-map"),
         )
-        .arg(switch("preview", "Also write a 3x3 tiling, as TILE.preview.png beside the tile"))
+        .arg(switch("preview", "Also write a 3x3 tiling, as TILE.preview.png beside the tile"));
+    usual(command)
+}
+
+/// What any command that makes pictures by chance can be told about its outputs and its run.
+pub(super) fn usual(command: Command) -> Command {
+    command
+        .next_help_heading("Outputs")
         .arg(switch("force", "Overwrite outputs that exist already"))
         .arg(json())
         .arg(switch("quiet", "Say nothing but errors").short('q'))
@@ -169,8 +176,7 @@ fn tile() -> Command {
         .args(running())
 }
 
-/// What any command that makes tiles can be told about its run.
-pub(super) fn running() -> [Arg; 2] {
+fn running() -> [Arg; 2] {
     [
         Arg::new("seed")
             .long("seed")

@@ -34,7 +34,7 @@ Examples:
 
 /// The command as it is typed.
 pub(super) fn command() -> Command {
-    Command::new(ExtractParams::VERB)
+    let command = Command::new(ExtractParams::VERB)
         .about("Cuts the tile out of a photo that repeats (cloth, bricks, windows) that stands best for all of it.")
         .before_help(EXAMPLES)
         .arg(Sources::photo())
@@ -51,12 +51,8 @@ pub(super) fn command() -> Command {
         .arg(maps::flag("A further map of the same surface, cut at the same places (tile_01_NAME.png); may be repeated"))
         .next_help_heading("Outputs")
         .arg(args::switch("save-source-maps", "Also write which photo pixel each tile pixel is (tile_01_source.exr), for \
-             `texforge apply`; the photo must not be scaled then"))
-        .arg(args::switch("force", "Overwrite outputs that exist already"))
-        .arg(args::json())
-        .arg(args::switch("quiet", "Say nothing but errors").short('q'))
-        .next_help_heading("Running")
-        .args(args::running())
+             `texforge apply`; the photo must not be scaled then"));
+    args::usual(command)
 }
 
 /// What was typed.

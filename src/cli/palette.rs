@@ -33,7 +33,7 @@ pub(super) fn command() -> Command {
     // The palette turns these two itself.
     let turned = |name: &str| name == "sigma" || name == "stationarity";
     let params = TileParams::schema().into_iter().filter(|param| !turned(param.name));
-    Command::new(NAME)
+    let command = Command::new(NAME)
         .about("Shows a photo evened out from little to much, in steps that look alike, to choose --stationarity by eye.")
         .before_help(EXAMPLES)
         .arg(Sources::photo())
@@ -54,13 +54,8 @@ pub(super) fn command() -> Command {
         )
         .args(params.map(args::flag))
         .next_help_heading("Inputs")
-        .args(Sources::args())
-        .next_help_heading("Outputs")
-        .arg(args::switch("force", "Overwrite outputs that exist already"))
-        .arg(args::json())
-        .arg(args::switch("quiet", "Say nothing but errors").short('q'))
-        .next_help_heading("Running")
-        .args(args::running())
+        .args(Sources::args());
+    args::usual(command)
 }
 
 /// What was typed.

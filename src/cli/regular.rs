@@ -42,7 +42,7 @@ const STRIP_PIXELS: usize = 1 << 23;
 
 /// The command as it is typed.
 pub(super) fn command() -> Command {
-    Command::new(RegularParams::VERB)
+    let command = Command::new(RegularParams::VERB)
         .about("Makes a near-regular texture (bricks, tiles, cloth, windows) of any size from a photo of one.")
         .before_help(EXAMPLES)
         .arg(Sources::photo())
@@ -62,12 +62,8 @@ pub(super) fn command() -> Command {
             args::file("save-source-map", "FILE.exr", "Also write which photo pixel each pixel is (where two are mixed, the one \
                  that there is more of), for `texforge apply`; the whole must fit into memory then")
                 .long("save-source-map"),
-        )
-        .arg(args::switch("force", "Overwrite outputs that exist already"))
-        .arg(args::json())
-        .arg(args::switch("quiet", "Say nothing but errors").short('q'))
-        .next_help_heading("Running")
-        .args(args::running())
+        );
+    args::usual(command)
 }
 
 /// What was typed.

@@ -4,13 +4,10 @@ use pyo3::prelude::*;
 
 use crate::base::ctx::Ctx;
 use crate::base::error::Error;
-use crate::image::picture::Picture;
 use crate::python::array::{ArrayIn, ArrayOut, MapOut, array_out, map_out};
 use crate::python::error::IntoPy as _;
-use crate::python::{NamedMap, enter, kind_named, mask_of};
+use crate::python::{NamedMap, enter, maps_of, mask_of};
 use crate::verb::extract::ExtractParams;
-use crate::verb::inputs::Inputs;
-use crate::verb::params::TileParams;
 
 /// A tile: the picture, the source map, its place (row, column), that in the photo (to the right,
 /// downwards), continuity, resemblance and score.
@@ -42,16 +39,7 @@ pub(super) fn extract<'py>(
     }
     let photo = photo.picture(py)?;
     let mask = mask.map(|mask| mask_of(py, &mask)).transpose()?;
-    let mut others = Vec::new();
-    for (name, maps, kind) in &maps {
-        let kind = kind_named(kind).into_py(py)?;
-        let maps = maps.iter().map(|map| map.picture(py)).collect::<PyResult<Vec<_>>>()?;
-        let all: Vec<&Picture> = maps.iter().collect();
-        Inputs::new(&photo)
-            .ensure_maps_fit(name, &all, kind, &TileParams::default())
-            .into_py(py)?;
-        others.extend(maps.into_iter().map(|map| (name.clone(), map, kind)));
-    }
+    let others = maps_of(py, &photo, &maps)?;
     let ctx = Ctx::new(seed, threads).into_py(py)?;
     let job = ctx.job();
     let (made, pieces, sheet) = enter::enter(py, &job, progress.as_ref(), move || {

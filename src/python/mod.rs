@@ -165,6 +165,25 @@ fn tiles<'py>(
     Ok((tiles, palette))
 }
 
+/// Further maps of one photo, which must fit it.
+fn maps_of(
+    py: Python<'_>,
+    photo: &Picture,
+    maps: &[NamedMap<'_>],
+) -> PyResult<Vec<(String, Picture, MapKind)>> {
+    let mut all = Vec::new();
+    for (name, maps, kind) in maps {
+        let kind = kind_named(kind).into_py(py)?;
+        let maps = maps.iter().map(|map| map.picture(py)).collect::<PyResult<Vec<_>>>()?;
+        let every: Vec<&Picture> = maps.iter().collect();
+        Inputs::new(photo)
+            .ensure_maps_fit(name, &every, kind, &TileParams::default())
+            .into_py(py)?;
+        all.extend(maps.into_iter().map(|map| (name.clone(), map, kind)));
+    }
+    Ok(all)
+}
+
 fn mask_of(py: Python<'_>, mask: &ArrayIn<'_>) -> PyResult<Mask> {
     Mask::from_picture(&mask.picture(py)?).into_py(py)
 }

@@ -4,13 +4,9 @@ use pyo3::prelude::*;
 
 use crate::base::ctx::Ctx;
 use crate::base::error::Error;
-use crate::image::material::MapKind;
-use crate::image::picture::Picture;
 use crate::python::array::{ArrayIn, ArrayOut, MapOut, array_out, map_out};
 use crate::python::error::IntoPy as _;
-use crate::python::{NamedMap, enter, kind_named, mask_of};
-use crate::verb::inputs::Inputs;
-use crate::verb::params::TileParams;
+use crate::python::{NamedMap, enter, maps_of, mask_of};
 use crate::verb::regular::{RegularMaker, RegularParams};
 
 /// A texture: the picture, the source map, the further maps by name, and the report as JSON.
@@ -39,27 +35,17 @@ pub(super) fn regular<'py>(
     }
     let photo = photo.picture(py)?;
     let mask = mask.map(|mask| mask_of(py, &mask)).transpose()?;
-    let (mut names, mut others) = (Vec::new(), Vec::new());
-    for (name, maps, kind) in &maps {
-        let kind = kind_named(kind).into_py(py)?;
-        for map in maps {
-            let map = map.picture(py)?;
-            Inputs::new(&photo)
-                .ensure_maps_fit(name, &[&map], kind, &TileParams::default())
-                .into_py(py)?;
-            names.push(name.clone());
-            others.push((map, kind));
-        }
-    }
+    let others = maps_of(py, &photo, &maps)?;
     let ctx = Ctx::new(seed, threads).into_py(py)?;
     let job = ctx.job();
     let (made, pieces) = enter::enter(py, &job, progress.as_ref(), move || {
-        let others: Vec<(&Picture, MapKind)> =
-            others.iter().map(|(map, kind)| (map, *kind)).collect();
-        RegularMaker::new(&ctx, &photo, mask.as_ref(), &settings)?.make(&ctx, &others)
+        let maps: Vec<_> = others.iter().map(|(_, map, kind)| (map, *kind)).collect();
+        let maker = RegularMaker::new(&ctx, &photo, mask.as_ref(), &settings)?;
+        let (made, pieces) = maker.make(&ctx, &maps)?;
+        let names = others.iter().map(|(name, ..)| name.clone());
+        Ok((made, names.zip(pieces).collect::<Vec<_>>()))
     })?;
-    let pieces = names.into_iter().zip(&pieces);
-    let pieces = pieces.map(|(name, piece)| Ok((name, array_out(py, piece)?)));
+    let pieces = pieces.into_iter().map(|(name, piece)| Ok((name, array_out(py, &piece)?)));
     let report = serde_json::to_string(&made.report)
         .map_err(|e| Error::Internal { message: e.to_string() })
         .into_py(py)?;

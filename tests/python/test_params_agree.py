@@ -36,7 +36,7 @@ def test_names_order_and_defaults_are_those_of_the_core(function: Callable[..., 
             assert entry["default"] == str(shown)
 
 
-@pytest.mark.parametrize("function", [texforge.tile, texforge.regular])
+@pytest.mark.parametrize("function", [texforge.tile, texforge.regular, texforge.extract])
 def test_the_words_accepted_are_those_of_the_core(function: Callable[..., object]) -> None:
     hints = typing.get_type_hints(function)
     schema = _texforge.schema(function.__name__)

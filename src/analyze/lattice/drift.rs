@@ -212,3 +212,78 @@ fn squared(a: &[u8], b: &[u8]) -> u32 {
     let square = |(&a, &b): (&u8, &u8)| u32::from(a.abs_diff(b)).pow(2);
     a.iter().zip(b).map(square).sum()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::rng::Rng;
+    use crate::signal::basis::dot;
+
+    const CELL: (i64, i64) = (20, 24);
+    const BASIS: Basis = [[24.0, 0.0], [0.0, 20.0]];
+
+    /// Rows of cells of one pattern with noise; every three rows lie further to the right or back, and
+    /// one cell is something else.
+    fn photo(height: usize, width: usize) -> MatchImage {
+        let mut image = MatchImage::new(height, width);
+        image.fill_rows(|y, row| {
+            let y = y as i64;
+            for (x, px) in (0..).zip(row.iter_mut()) {
+                let inside = x - shift(y);
+                let key = inside.rem_euclid(CELL.1) / 3 * 100 + y.rem_euclid(CELL.0) / 3;
+                let mut rng = Rng::new(1, 0, 0, key as u64);
+                let mut noise = Rng::new(2, 0, y as u32, x as u64);
+                let mut code = || (rng.below(100) + noise.below(20)) as u8;
+                *px = [code(), code(), code(), 0];
+                if (101..119).contains(&y) && (101..123).contains(&x) {
+                    *px = [noise.below(128) as u8, 0, 127, 0];
+                }
+            }
+        });
+        image
+    }
+
+    /// How far to the right row `y` lies.
+    fn shift(y: i64) -> i64 {
+        [0, 1, 2, 1][(y / (3 * CELL.0)) as usize % 4]
+    }
+
+    #[test]
+    fn rows_of_cells_are_found_where_they_lie() {
+        let drift = Drift::measured(BASIS, (240, 264), |scale| {
+            assert_eq!(scale, 1.0, "cells as small as these are looked at as they are");
+            photo(240, 264)
+        });
+        // The middle of each three rows, from left to right; the mean cell lies anywhere.
+        let at = |row: usize, column: usize| drift.at(column as f64, row as f64);
+        for column in 1..10 {
+            let first = at(2, column);
+            for (row, want) in [(5, 1.0), (8, 2.0), (11, 1.0)] {
+                let here = at(row, column);
+                let off = [here[0] - first[0] - want, here[1] - first[1]];
+                assert!(
+                    dot(off, off).sqrt() < 0.4,
+                    "row {row}, column {column}: {here:?} {first:?}"
+                );
+            }
+        }
+        let (root, most) = drift.extent();
+        assert!(root > 0.3 && most < 2.5, "{root} {most}");
+        // Half way between two cells it is the mean of theirs.
+        let (a, b, between) = (at(3, 4), at(4, 4), drift.at(4.0, 3.5));
+        assert!((0..2).all(|k| (between[k] - 0.5 * (a[k] + b[k])).abs() < 1e-12));
+    }
+
+    #[test]
+    fn outliers_and_unknown_cells_take_what_is_around_them() {
+        let all = |v: f64| vec![Some([v, -v]); 35];
+        let mut moved = all(1.0);
+        moved[17] = Some([9.0, 0.0]);
+        moved[0] = None;
+        assert_eq!(settled(&moved, 7, 2.0), vec![[1.0, -1.0]; 35]);
+        assert_eq!(settled(&[None; 35], 7, 2.0), vec![[0.0; 2]; 35]);
+        let mut near = all(1.0);
+        near[17] = Some([2.5, -1.0]);
+        assert_eq!(settled(&near, 7, 2.0)[17], [2.5, -1.0], "not far enough to be wrong");
+    }
+}

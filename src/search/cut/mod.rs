@@ -241,9 +241,11 @@ mod tests {
             let found = division.solve();
             prop_assert!(allowed(&|p| found[p]));
             prop_assert_eq!(Some(cost(&|p| found[p])), least);
-            // By steps of one pixel nothing is given away; by two it is allowed and no worse than squares.
+            // By steps of one pixel nothing is given away; by two it still is what is allowed.
             let steps = division.solve_by_steps(1);
             prop_assert_eq!(Some(cost(&|p| steps[p])), least);
+            let steps = division.solve_by_steps(2);
+            prop_assert!(allowed(&|p| steps[p]) && Some(cost(&|p| steps[p])) >= least);
         }
     }
 }
