@@ -75,11 +75,11 @@ def regular(
         Whether cells of the photo that lie beside their place on the lattice are put into it.
     block : int, optional
         Side of the blocks that the texture is made of, in pixels, 8 or more: larger keeps more of
-        the photo together, smaller mixes more. By default 0.6 of a cell's side, or 64 if that
+        the photo together, smaller mixes more. By default the root of a cell's area, or 64 if that
         is more, as far as the photo is large enough.
     border : int, optional
         How far pieces overlap with their neighbours, to either side, in pixels, 1 to half a block.
-        By default three eighths of a block.
+        By default 0.45 of a block.
     candidates : int
         How many pieces are tried for every gap, 1 to 65536.
     tolerance : int
@@ -88,7 +88,8 @@ def regular(
         By what a piece for a gap is chosen: squared differences of colour, or normalized
         cross-correlation, for which lines count more than brightness.
     deform : int
-        How far such a piece may be bent so that lines meet, in pixels, 0 (not at all) to 8.
+        How far such a piece may be bent so that lines meet that do not by themselves, in pixels,
+        0 (not at all) to 8.
     seam : {"graph", "cut", "linear"}
         How pieces are joined: where the seam shows least, anywhere in the overlap (graph cut);
         along the path of least difference across each side (minimum-error boundary cut); or faded
@@ -99,7 +100,8 @@ def regular(
     flatten : float, optional
         Reach of the light flattening, as a fraction of the photo's shorter side, 0 (off) or 0.02
         to 1, as for `tile`: else pieces from dark and from bright parts would lie side by side. By
-        default a quarter, or more where a period is longer; data is left as it is.
+        default a quarter, or more where a period is longer; data is left as it is, and so are
+        photos that would change by more than 2.5 times, which is not light.
     seed : int
         Seed of all random choices, 0 to 2**64 - 1.
     mask : (H, W) array_like, or Pillow image, optional

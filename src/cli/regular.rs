@@ -209,6 +209,7 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Str
     let streams =
         |output: &Output<'_>| Format::from_extension(&output.path).is_some_and(Format::streams);
     let to_files = request.output != Target::Stdout;
+    let mut piped = None;
     if to_files && request.source_map.is_none() && outputs.iter().all(streams) {
         write_strips(session, ctx, &maker, &outputs)?;
     } else {
@@ -227,11 +228,13 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Str
             files.push(Written::new("source_map", None, path, width, height));
         }
         if !to_files {
-            let bytes = files::encode(&texture.picture, None, MapKind::Color, Some(&record))?;
-            to_stdout(&bytes)?;
+            piped = Some(files::encode(&texture.picture, None, MapKind::Color, Some(&record))?);
         }
     }
     session.staging.commit(session, request.force)?;
+    if let Some(bytes) = piped {
+        to_stdout(&bytes)?;
+    }
     report.seconds.push(("synthesis", start.elapsed().as_secs_f64()));
     for file in files.iter().filter(|f| f.role != "texture") {
         session.console.say(&format!("{}  {width}x{height} ({})", file.path, file.what()));

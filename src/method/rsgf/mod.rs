@@ -233,16 +233,13 @@ impl<'a> Mosaic<'a> {
             let old = self.old(ctx, block, before)?;
             let corner = self.window_at(block, offset).map(|v| v as i32);
             let places = deform::bent(image, &lenses, corner, &old, self.plan.deform);
-            let shares = match self.plan.seam {
-                Seam::Graph => seam::cut_by_graph(image, &lenses, &places, &old),
-                Seam::Cut => seam::cut_along_sides(image, &lenses, &places, &old),
-                Seam::Linear => seam::faded(&lenses),
-            };
             // The windows' rims are not the gap's, and stay so.
             let reach = self.plan.feather.min(lenses.border.saturating_sub(1));
+            let feathered = |cut: Vec<u8>| seam::feathered(&lenses, &cut, reach);
             let shares = match self.plan.seam {
-                Seam::Linear => shares,
-                Seam::Graph | Seam::Cut => seam::feathered(&lenses, &shares, reach),
+                Seam::Graph => feathered(seam::cut_by_graph(image, &lenses, &places, &old)),
+                Seam::Cut => feathered(seam::cut_along_sides(image, &lenses, &places, &old)),
+                Seam::Linear => seam::faded(&lenses),
             };
             ctx.step(1)?;
             Ok((block, Filled { places, shares }))

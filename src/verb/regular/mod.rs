@@ -79,7 +79,7 @@ pub struct Regular {
 /// Same photo, mask, parameters and `ctx.seed`: same bytes, for any thread count and SIMD level.
 ///
 /// # Errors
-/// [`Error::Parameter`], [`Error::BadPicture`] (constant; no lattice was found; no piece fits),
+/// [`Error::Parameter`], [`Error::BadPicture`] (constant; no piece fits), [`Error::NoStructure`] (no lattice was found),
 /// [`Error::TooSmall`] (smaller than a block), [`Error::SizeMismatch`] (mask), [`Error::NotFinite`],
 /// [`Error::Memory`] (checked before anything is allocated), [`Error::Cancelled`].
 pub fn regular(

@@ -118,7 +118,7 @@ params! {
         seam: Seam = Seam::Graph;
         /// How far the two sides of a seam are faded into each other; with 0 every pixel is a copy of one of the photo's. Linear seams are as wide as the border.
         feather: usize = 4, in 0..=64, unit "px";
-        /// Reach of the light flattening: differences of light that are wider are taken out of the photo first, as pieces from dark and from bright parts would lie side by side. Auto takes a quarter, or more where a period is longer; 0 switches it off.
+        /// Reach of the light flattening: differences of light that are wider are taken out of the photo first, as pieces from dark and from bright parts would lie side by side. Auto takes a quarter, or more where a period is longer, unless it would change colours by more than 2.5 times; 0 switches it off.
         flatten: OrAuto<f32> = OrAuto::Auto, unit "fraction of the photo's shorter side";
     }
 }
