@@ -15,7 +15,7 @@ QUALITY ?=
 LATTICES ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-rust test-python lint format gallery quality lattices extracts regular-gallery readme-pictures bench bench-peers bench-record wheel ci clean
+.PHONY: help setup demo test test-rust test-python lint format gallery quality lattices extracts regular-gallery readme-pictures bench bench-peers bench-record wheel ci fuzz clean
 
 help: ## List the targets.
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -99,7 +99,15 @@ bench-record: $(BIN)/.ready ## Measure all and keep it in benches/record/.
 wheel: $(BIN)/.ready ## Build the wheel for distribution, in dist/.
 	$(BIN)/maturin build --release --out dist
 
+# What may land is decided by the change, not by the luck of a draw: property tests draw the same
+# cases here each time. Elsewhere they draw new ones; `make fuzz` draws many.
+ci: export PROPTEST_RNG_SEED = 1
+ci: export HYPOTHESIS_PROFILE = ci
 ci: lint test ## What CI runs.
+
+fuzz: export PROPTEST_CASES = 4000
+fuzz: export HYPOTHESIS_PROFILE = thorough
+fuzz: test ## Run every test with many random cases (hours).
 
 clean: ## Remove what was built.
 	rm -rf target $(VENV) demo gallery lattices extracts regular-gallery dist

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 # The first call in a process is slow; time is judged by nobody here.
 hypothesis.settings.register_profile("default", deadline=None, max_examples=25)
 hypothesis.settings.register_profile("thorough", deadline=None, max_examples=500)
+hypothesis.settings.register_profile("ci", deadline=None, max_examples=25, derandomize=True)
 hypothesis.settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "default"))
 
 QUICK: dict[str, Any] = {"size": (24, 32), "patch": 5, "quality": "draft"}
