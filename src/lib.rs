@@ -18,6 +18,7 @@
 pub mod analyze;
 pub mod base;
 pub mod cli;
+pub mod export;
 pub mod image;
 pub mod method;
 #[cfg(feature = "python")]
@@ -36,6 +37,7 @@ pub use image::rect::Rect;
 pub use image::sigma_map::SigmaMap;
 pub use image::sourcemap::{Origin, SourceMap};
 pub use image::symmetry::Symmetry;
+pub use method::noise::Filter;
 pub use method::representative::Place;
 pub use verb::extract::{
     ExtractParams, ExtractReport, ExtractedTile, Extraction, FoundPeriod, PeriodSource, Scaling,
@@ -43,6 +45,9 @@ pub use verb::extract::{
 };
 pub use verb::inputs::Inputs;
 pub use verb::lattice::{Lattice, LatticeParams, detect_lattice, lattice_autocorrelation};
+pub use verb::noise::{
+    NamedMap, NoiseParams, NoiseReport, NoiseTexture, RenderParams, SampleType, fit_noise,
+};
 pub use verb::palette::{Palette, palette};
 pub use verb::params::{Axis, Follow, Measure, Method, Quality, Size, Symmetries, TileParams};
 pub use verb::redo::Redo;

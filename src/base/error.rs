@@ -97,6 +97,12 @@ pub enum Error {
         /// What the user can do about it.
         remedy: String,
     },
+    /// The document of a procedural texture is damaged or of a later version.
+    #[error("this is no procedural texture: {reason}; make one with `texforge noise fit`")]
+    Document {
+        /// What is wrong with it.
+        reason: String,
+    },
     /// The work would not fit into memory; nothing was allocated.
     #[error(
         "{what} needs about {need_mib} MiB of memory, {available_mib} MiB are available; \
@@ -177,6 +183,8 @@ pub enum ErrorKind {
     BadPicture,
     /// See [`Error::NoStructure`].
     NoStructure,
+    /// See [`Error::Document`].
+    Document,
     /// See [`Error::Memory`].
     Memory,
     /// See [`Error::Decode`].
@@ -197,7 +205,7 @@ pub enum ErrorKind {
 
 impl ErrorKind {
     /// Every kind, in declaration order.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 16] = [
         Self::Parameter,
         Self::TooSmall,
         Self::EmptyMask,
@@ -205,6 +213,7 @@ impl ErrorKind {
         Self::SizeMismatch,
         Self::BadPicture,
         Self::NoStructure,
+        Self::Document,
         Self::Memory,
         Self::Decode,
         Self::Format,
@@ -225,6 +234,7 @@ impl ErrorKind {
             Self::SizeMismatch => "size_mismatch",
             Self::BadPicture => "bad_picture",
             Self::NoStructure => "no_structure",
+            Self::Document => "document",
             Self::Memory => "memory",
             Self::Decode => "decode",
             Self::Format => "format",
@@ -248,6 +258,7 @@ impl Error {
             Self::SizeMismatch { .. } => ErrorKind::SizeMismatch,
             Self::BadPicture { .. } => ErrorKind::BadPicture,
             Self::NoStructure { .. } => ErrorKind::NoStructure,
+            Self::Document { .. } => ErrorKind::Document,
             Self::Memory { .. } => ErrorKind::Memory,
             Self::Decode { .. } => ErrorKind::Decode,
             Self::Format { .. } => ErrorKind::Format,

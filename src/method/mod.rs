@@ -2,6 +2,7 @@
 
 pub mod flatten;
 pub mod make_seamless;
+pub mod noise;
 pub mod representative;
 pub mod rsgf;
 pub mod stationary;

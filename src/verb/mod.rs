@@ -4,6 +4,7 @@ pub mod extract;
 pub mod inputs;
 pub mod lattice;
 mod maker;
+pub mod noise;
 pub mod palette;
 pub mod params;
 pub mod redo;

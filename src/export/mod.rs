@@ -1,0 +1,16 @@
+//! Room 6: procedural textures written for other programs.
+//!
+//! [`Program`] lists what every target needs; each target is one file that turns it into text.
+
+mod program;
+
+pub use program::{Program, ProgramChannel, ProgramTerm};
+
+/// One file of an export.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ExportFile {
+    /// Its name without a folder.
+    pub name: String,
+    /// Its contents.
+    pub bytes: Vec<u8>,
+}

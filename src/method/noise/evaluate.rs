@@ -1,0 +1,263 @@
+//! [`Evaluator`]: a document made ready to give values.
+
+use std::collections::HashMap;
+use std::sync::{Arc, OnceLock};
+
+use crate::method::noise::document::{Document, Model, Term};
+use crate::method::noise::shape::Shape;
+use crate::signal::wavelet_noise::spectrum::at_pixels;
+use crate::signal::wavelet_noise::{Detail, Solid, Torus};
+
+/// How bands that a sample cannot hold are treated.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Filter {
+    /// Distance of samples in pixels of the photo: bands fade as they reach its Nyquist limit. 0 keeps
+    /// all bands.
+    pub footprint: f64,
+    /// Whether the bands that remain are strengthened so that the contrast stays.
+    pub keep_contrast: bool,
+}
+
+impl Filter {
+    /// All bands as they are.
+    pub const NONE: Self = Self { footprint: 0.0, keep_contrast: false };
+}
+
+/// A document made ready to give values at points.
+#[derive(Debug)]
+pub struct Evaluator {
+    document: Document,
+    pub(super) terms: Vec<Term>,
+    pub(super) tori: Vec<Arc<Torus>>,
+    /// Of each term, for points in space.
+    solids: OnceLock<Vec<Arc<Solid>>>,
+    /// Variance of each term's noise at the photo's pixels.
+    at_pixels: Vec<f64>,
+    pub(super) channels: Vec<ChannelEvaluator>,
+    mean: Vec<f32>,
+    matrix: Vec<Vec<f32>>,
+    /// Cosine and sine of the directions' angle.
+    pub(crate) turn: Option<[f64; 2]>,
+}
+
+/// An independent channel made ready.
+#[derive(Debug, Clone)]
+pub(super) struct ChannelEvaluator {
+    weights: Vec<f32>,
+    pub(super) offsets: Vec<[f64; 3]>,
+    /// Variance of each band at the photo's pixels, with its weight.
+    variances: Vec<f64>,
+    shape: Option<Shape>,
+}
+
+/// A channel's weights under a filter, and what brings its noise into shape.
+#[derive(Debug, Clone)]
+pub(crate) struct Filtered {
+    /// Of each term.
+    pub(crate) weights: Vec<f32>,
+    /// From noise to standard deviations; 0 for no noise at all.
+    pub(crate) per_deviation: f32,
+    /// Standard deviation of what the filter took away, in those of all.
+    lost: f32,
+}
+
+impl Evaluator {
+    /// Of a valid document.
+    pub fn new(document: Document) -> Self {
+        let terms = document.terms();
+        let mut made: HashMap<Detail, Arc<Torus>> = HashMap::new();
+        let side = (Torus::SIDE, Torus::SIDE);
+        let mut torus = |t: &Term| {
+            made.entry(t.detail).or_insert_with(|| Arc::new(Torus::new(side, t.detail))).clone()
+        };
+        let tori = terms.iter().map(&mut torus).collect();
+        let at_pixels: Vec<f64> = terms.iter().map(|t| at_pixels(t.detail, t.levels)).collect();
+        let channels = document.channels().iter().enumerate().map(|(c, channel)| {
+            let offset = |(t, term): (usize, &Term)| {
+                let [x, y] = term.levels;
+                document.offset(t, [x, y, x], c).map(f64::from)
+            };
+            ChannelEvaluator {
+                weights: channel.weights.iter().map(|&w| w as f32).collect(),
+                offsets: terms.iter().enumerate().map(offset).collect(),
+                variances: channel.weights.iter().zip(&at_pixels).map(|(w, v)| w * w * v).collect(),
+                shape: channel.histogram.as_ref().map(|values| {
+                    let values = std::array::from_fn(|i| values[i]);
+                    Shape::new(&values)
+                }),
+            }
+        });
+        let turn = match &document.model {
+            Model::Oriented { angle, .. } if *angle != 0.0 => {
+                let radians = angle.to_radians();
+                Some([libm::cos(radians), libm::sin(radians)])
+            }
+            _ => None,
+        };
+        Self {
+            channels: channels.collect(),
+            mean: document.mean.iter().map(|&v| v as f32).collect(),
+            matrix: document.matrix.iter().map(|r| r.iter().map(|&v| v as f32).collect()).collect(),
+            terms,
+            tori,
+            solids: OnceLock::new(),
+            at_pixels,
+            turn,
+            document,
+        }
+    }
+
+    /// What it was made of.
+    pub fn document(&self) -> &Document {
+        &self.document
+    }
+
+    /// Number of channels of a value.
+    pub fn channels(&self) -> usize {
+        self.mean.len()
+    }
+
+    /// What brings independent channel `c` into shape.
+    pub(crate) fn shape(&self, c: usize) -> Option<&Shape> {
+        self.channels[c].shape.as_ref()
+    }
+
+    /// The weights of every independent channel under `filter`.
+    pub(crate) fn filtered(&self, filter: Filter) -> Vec<Filtered> {
+        let kept: Vec<f64> = self.terms.iter().map(|t| kept(t, filter.footprint)).collect();
+        let of = |channel: &ChannelEvaluator| {
+            let total: f64 = channel.variances.iter().sum();
+            let left: f64 = channel.variances.iter().zip(&kept).map(|(v, k)| v * k * k).sum();
+            let gain = if filter.keep_contrast && left > 0.0 { (total / left).sqrt() } else { 1.0 };
+            let lost = if filter.keep_contrast { 0.0 } else { (total - left).max(0.0) };
+            let weight = |(w, k): (&f32, &f64)| (f64::from(*w) * k * gain) as f32;
+            Filtered {
+                weights: channel.weights.iter().zip(&kept).map(weight).collect(),
+                per_deviation: if total > 0.0 { total.sqrt().recip() as f32 } else { 0.0 },
+                lost: if total > 0.0 { (lost / total).sqrt() as f32 } else { 0.0 },
+            }
+        };
+        self.channels.iter().map(of).collect()
+    }
+
+    /// Values at points (x, y): every channel, with full scale 1, not clipped.
+    ///
+    /// The same bits as [`raster`](super::raster::render) gives at those of its pixels' middles.
+    pub fn plane(&self, points: &[[f64; 2]], filter: Filter, out: &mut [f32]) {
+        let filtered = self.filtered(filter);
+        let mut noise = vec![0.0; self.channels.len()];
+        for (point, out) in points.iter().zip(out.chunks_exact_mut(self.channels())) {
+            for ((value, channel), f) in noise.iter_mut().zip(&self.channels).zip(&filtered) {
+                *value = self.plane_noise(channel, f, *point);
+            }
+            self.colour(&filtered, &noise, out);
+        }
+    }
+
+    fn plane_noise(&self, channel: &ChannelEvaluator, filtered: &Filtered, point: [f64; 2]) -> f32 {
+        let [x, y] = self.turned(point);
+        let mut sum = 0.0;
+        for (t, &weight) in filtered.weights.iter().enumerate() {
+            if weight != 0.0 {
+                let (term, offset) = (&self.terms[t], channel.offsets[t]);
+                let x = position(x, offset[0], term.levels[0]);
+                let y = position(y, offset[1], term.levels[1]);
+                sum += weight * self.tori[t].at(x, y);
+            }
+        }
+        sum
+    }
+
+    /// A point in the directions of the noise.
+    pub(super) fn turned(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        self.turn.map_or([x, y], |[c, s]| [c * x + s * y, c * y - s * x])
+    }
+
+    /// Values at points (x, y, z) of a solid texture; on a surface if its unit normals are given, one for
+    /// each point: then without the low frequencies that a cut through a solid has.
+    ///
+    /// Only of isotropic noise.
+    pub fn solid(
+        &self,
+        points: &[[f64; 3]],
+        normals: Option<&[[f64; 3]]>,
+        filter: Filter,
+        out: &mut [f32],
+    ) {
+        let solids = self.solids.get_or_init(|| {
+            let mut made: HashMap<Detail, Arc<Solid>> = HashMap::new();
+            let mut of = |d| made.entry(d).or_insert_with(|| Arc::new(Solid::new(d))).clone();
+            self.terms.iter().map(|t| of(t.detail)).collect()
+        });
+        let filtered = self.filtered(filter);
+        // As strong as the bands are at the photo's pixels.
+        let gains: Vec<f32> = self.at_pixels.iter().map(|v| v.sqrt() as f32).collect();
+        let mut noise = vec![0.0; self.channels.len()];
+        for (i, (point, out)) in
+            points.iter().zip(out.chunks_exact_mut(self.channels())).enumerate()
+        {
+            for ((value, channel), f) in noise.iter_mut().zip(&self.channels).zip(&filtered) {
+                *value = 0.0;
+                for (t, &weight) in f.weights.iter().enumerate() {
+                    if weight == 0.0 {
+                        continue;
+                    }
+                    let level = self.terms[t].levels[0];
+                    let at =
+                        std::array::from_fn(|k| position(point[k], channel.offsets[t][k], level));
+                    let noise = match normals {
+                        Some(normals) => solids[t].projected(at, normals[i]),
+                        None => solids[t].at(at),
+                    };
+                    *value += weight * gains[t] * noise;
+                }
+            }
+            self.colour(&filtered, &noise, out);
+        }
+    }
+
+    /// The channels of a value of the independent channels' `noise`.
+    #[inline]
+    pub(super) fn colour(&self, filtered: &[Filtered], noise: &[f32], out: &mut [f32]) {
+        out.copy_from_slice(&self.mean);
+        for (c, (&value, f)) in noise.iter().zip(filtered).enumerate() {
+            let shaped = match &self.channels[c].shape {
+                None => value,
+                Some(shape) => shaped(shape, value * f.per_deviation, f.lost),
+            };
+            for (out, row) in out.iter_mut().zip(&self.matrix) {
+                *out += row[c] * shaped;
+            }
+        }
+    }
+}
+
+/// The mean of the shape over what the filter took away, which is normally distributed: by three places
+/// of Gauss-Hermite quadrature.
+#[inline]
+fn shaped(shape: &Shape, u: f32, lost: f32) -> f32 {
+    if lost == 0.0 {
+        return shape.at(u);
+    }
+    let side = 1.732_050_8 * lost;
+    (shape.at(u - side) + shape.at(u + side)) * (1.0 / 6.0) + shape.at(u) * (2.0 / 3.0)
+}
+
+/// Position of `at`, in pixels, on the torus of a band. The middle of the photo's first pixel is a
+/// coefficient of the finest band.
+#[inline]
+pub(super) fn position(at: f64, offset: f64, level: u32) -> f64 {
+    // Exact but for the sum: the divisor is a power of two.
+    (at - 0.5 + offset) / f64::from(1u32 << level)
+}
+
+/// What share of a band is kept when samples are `footprint` apart: all up to where its highest frequency
+/// is the Nyquist limit, nothing from where its lowest is.
+fn kept(term: &Term, footprint: f64) -> f64 {
+    let finest = f64::from(term.levels[0].min(term.levels[1]));
+    if footprint <= 0.0 {
+        return 1.0;
+    }
+    let t = (1.0 + finest - libm::log2(footprint)).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}

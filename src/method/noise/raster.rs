@@ -1,0 +1,140 @@
+//! [`render`]: pictures of a procedural texture.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use crate::base::ctx::Ctx;
+use crate::base::error::Result;
+use crate::method::noise::evaluate::{Evaluator, Filter, position};
+use crate::signal::wavelet_noise::{Detail, Row, Torus};
+
+/// Which part of a texture is rendered.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct View {
+    /// Rows and columns.
+    pub size: (usize, usize),
+    /// Distance of pixels, in pixels of the photo.
+    pub scale: f64,
+    /// Where the picture's upper left corner lies (x, y), in pixels of the photo.
+    pub origin: [f64; 2],
+    /// Whether it goes round: right fits left and bottom fits top. Such a texture is another one than
+    /// that which does not, with the same statistics; bands coarser than a quarter of it are left out.
+    pub tileable: bool,
+}
+
+/// The coefficients of a term and where pixels lie on them, along an axis.
+struct Grid {
+    torus: Arc<Torus>,
+    /// Coefficients to a pixel of the photo, along x and y; of a texture that need not go round the
+    /// inverse of a power of two.
+    per_pixel: Option<[f64; 2]>,
+}
+
+/// Renders `view`, a step of progress to a row: row by row, for every pixel all channels, with full scale 1, not clipped.
+///
+/// # Errors
+/// [`Error::Cancelled`](crate::Error::Cancelled).
+pub fn render(ctx: &Ctx, evaluator: &Evaluator, view: &View, filter: Filter) -> Result<Vec<f32>> {
+    let (rows, cols) = view.size;
+    let channels = evaluator.channels();
+    let mut out = vec![0.0; rows * cols * channels];
+    let at = |i: usize, axis: usize| view.origin[axis] + (i as f64 + 0.5) * view.scale;
+    if evaluator.turn.is_some() {
+        // Not along the axes: point by point.
+        let lines = out.par_chunks_mut(cols * channels).enumerate();
+        return lines
+            .try_for_each(|(y, line)| {
+                ctx.step(1)?;
+                let points: Vec<_> = (0..cols).map(|x| [at(x, 0), at(y, 1)]).collect();
+                evaluator.plane(&points, filter, line);
+                Ok(())
+            })
+            .map(|()| out);
+    }
+    let filtered = evaluator.filtered(filter);
+    let grids = grids(evaluator, view);
+    let place =
+        |at: f64, axis: usize, offset: f64, term: usize| match grids[term].as_ref()?.per_pixel {
+            None => Some(position(at, offset, evaluator.terms[term].levels[axis])),
+            // The offset is in pixels of a band as it is in the document.
+            Some(per) => Some(
+                (at - 0.5) * per[axis] + position(0.5, offset, evaluator.terms[term].levels[axis]),
+            ),
+        };
+    // Where the columns lie, for every channel and term.
+    let columns: Vec<Vec<Option<Row>>> = evaluator
+        .channels
+        .iter()
+        .map(|channel| {
+            let terms = channel.offsets.par_iter().enumerate();
+            let row = |(t, offset): (usize, &[f64; 3])| {
+                let n = grids[t].as_ref()?.torus.shape().1;
+                place(0.5, 0, 0.0, t)?;
+                let places = (0..cols).filter_map(|x| place(at(x, 0), 0, offset[0], t));
+                Some(Row::new(places, n))
+            };
+            terms.map(row).collect()
+        })
+        .collect();
+    let lines = out.par_chunks_mut(cols * channels).enumerate();
+    lines.try_for_each_init(
+        || {
+            (
+                vec![0.0; cols * evaluator.channels.len()],
+                Vec::new(),
+                vec![0.0; evaluator.channels.len()],
+            )
+        },
+        |(noise, combined, one), (y, line)| {
+            ctx.step(1)?;
+            noise.fill(0.0);
+            for (c, (channel, noise)) in
+                evaluator.channels.iter().zip(noise.chunks_mut(cols)).enumerate()
+            {
+                for (t, &weight) in filtered[c].weights.iter().enumerate() {
+                    let (Some(grid), Some(row)) = (&grids[t], &columns[c][t]) else { continue };
+                    let Some(y) = place(at(y, 1), 1, channel.offsets[t][1], t) else { continue };
+                    if weight != 0.0 {
+                        grid.torus.add_row(row, y, weight, combined, noise);
+                    }
+                }
+            }
+            for (x, out) in line.chunks_exact_mut(channels).enumerate() {
+                one.iter_mut().enumerate().for_each(|(c, v)| *v = noise[c * cols + x]);
+                evaluator.colour(&filtered, one, out);
+            }
+            Ok(())
+        },
+    )?;
+    Ok(out)
+}
+
+/// The coefficients of every term; `None` for one too coarse for a texture that goes round.
+fn grids(evaluator: &Evaluator, view: &View) -> Vec<Option<Grid>> {
+    let mut made: HashMap<((usize, usize), Detail), Arc<Torus>> = HashMap::new();
+    let terms = evaluator.terms.iter().zip(&evaluator.tori);
+    let grid = |(term, torus): (&crate::method::noise::document::Term, &Arc<Torus>)| {
+        if !view.tileable {
+            return Some(Grid { torus: torus.clone(), per_pixel: None });
+        }
+        let (rows, cols) = view.size;
+        // The nearest even number of coefficients a period, in as many repetitions as needed.
+        let fitting = |pixels: usize, level: u32| {
+            let coefficients = pixels as f64 * view.scale / f64::from(1u32 << level);
+            let times = (coefficients / Torus::SIDE as f64 - 1e-9).ceil().max(1.0);
+            let period = 2.0 * (coefficients / times / 2.0).round();
+            (period >= 4.0)
+                .then_some((period as usize, period * times / (pixels as f64 * view.scale)))
+        };
+        let (across, per_x) = fitting(cols, term.levels[0])?;
+        let (down, per_y) = fitting(rows, term.levels[1])?;
+        let torus = made
+            .entry(((down, across), term.detail))
+            .or_insert_with(|| Arc::new(Torus::new((down, across), term.detail)))
+            .clone();
+        Some(Grid { torus, per_pixel: Some([per_x, per_y]) })
+    };
+    terms.map(grid).collect()
+}

@@ -1,0 +1,122 @@
+//! The power spectrum of a plane that does not repeat.
+
+use rayon::prelude::*;
+use rustfft::FftPlanner;
+use rustfft::num_complex::Complex;
+
+/// Share of a line that the window fades over, both ends together.
+const TAPER: f64 = 0.25;
+
+/// Weights of a line's samples: a Tukey window. It takes away the edge that a transform would see where
+/// opposite ends of a photo meet.
+pub fn window(n: usize) -> Vec<f64> {
+    let fade = TAPER * n as f64 / 2.0;
+    (0..n)
+        .map(|i| {
+            let inwards = i.min(n - 1 - i) as f64 + 0.5;
+            if inwards >= fade {
+                1.0
+            } else {
+                0.5 - 0.5 * libm::cos(std::f64::consts::PI * inwards / fade)
+            }
+        })
+        .collect()
+}
+
+/// Power of a plane of `(height, width)` samples at every frequency of its discrete Fourier transform,
+/// row by row, frequency 0 first and set to nothing; the sum of all is the plane's variance. The plane is
+/// weighted by [`window`] along both axes and its weighted mean taken out.
+///
+/// Deterministic for any number of threads; the last bits may differ between CPUs.
+pub fn power_spectrum(plane: &[f32], (height, width): (usize, usize)) -> Vec<f64> {
+    let (down, along) = (window(height), window(width));
+    let total = |weights: &[f64]| weights.iter().sum::<f64>();
+    let rows = plane.chunks_exact(width).zip(&down);
+    let row = |(row, wy): (&[f32], &f64)| -> f64 {
+        wy * row.iter().zip(&along).map(|(&v, wx)| f64::from(v) * wx).sum::<f64>()
+    };
+    let mean = rows.map(row).sum::<f64>() / (total(&down) * total(&along));
+    let mut planner = FftPlanner::<f64>::new();
+    let (of_rows, of_columns) = (planner.plan_fft_forward(width), planner.plan_fft_forward(height));
+    let mut rows = vec![Complex::default(); plane.len()];
+    let lines = rows.par_chunks_mut(width).zip(plane.par_chunks(width)).zip(&down);
+    lines.for_each_init(
+        || vec![Complex::default(); of_rows.get_inplace_scratch_len()],
+        |scratch, ((to, from), wy)| {
+            for ((to, &v), wx) in to.iter_mut().zip(from).zip(&along) {
+                to.re = (f64::from(v) - mean) * wx * wy;
+            }
+            of_rows.process_with_scratch(to, scratch);
+        },
+    );
+    let mut columns = transposed(&rows, width);
+    drop(rows);
+    let square = |weights: &[f64]| weights.iter().map(|w| w * w).sum::<f64>();
+    let scale = 1.0 / (square(&down) * square(&along) * plane.len() as f64);
+    let mut power = vec![0.0; plane.len()];
+    columns.par_chunks_mut(height).zip(power.par_chunks_mut(height)).for_each_init(
+        || vec![Complex::default(); of_columns.get_inplace_scratch_len()],
+        |scratch, (column, power)| {
+            of_columns.process_with_scratch(column, scratch);
+            power.iter_mut().zip(column).for_each(|(power, v)| *power = v.norm_sqr() * scale);
+        },
+    );
+    power[0] = 0.0;
+    transposed(&power, height)
+}
+
+/// A plane with lines of `length` turned into its columns.
+fn transposed<T: Copy + Default + Send + Sync>(plane: &[T], length: usize) -> Vec<T> {
+    const LINES: usize = 16;
+    let lines = plane.len() / length;
+    let mut out = vec![T::default(); plane.len()];
+    out.par_chunks_mut(LINES * lines).enumerate().for_each(|(band, out)| {
+        let first = band * LINES;
+        for line in 0..lines {
+            let from = &plane[line * length + first..(line + 1) * length];
+            for (k, &v) in from.iter().take(LINES).enumerate() {
+                out[k * lines + line] = v;
+            }
+        }
+    });
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_is_the_transform_of_the_weighted_plane() {
+        let (h, w) = (12, 18);
+        let plane: Vec<f32> = (0..h * w).map(|i| ((i * 37 + i / w * 11) % 17) as f32).collect();
+        let (down, along) = (window(h), window(w));
+        let weight = |i: usize| down[i / w] * along[i % w];
+        let total: f64 = (0..h * w).map(weight).sum();
+        let mean = (0..h * w).map(|i| weight(i) * f64::from(plane[i])).sum::<f64>() / total;
+        let square: f64 = (0..h * w).map(|i| weight(i).powi(2)).sum();
+        let got = power_spectrum(&plane, (h, w));
+        assert_eq!(got[0], 0.0);
+        for (i, &got) in got.iter().enumerate().skip(1) {
+            let (r, q) = (i / w, i % w);
+            let sum: Complex<f64> = (0..h * w)
+                .map(|k| {
+                    let turns = (q * (k % w)) as f64 / w as f64 + (r * (k / w)) as f64 / h as f64;
+                    let value = weight(k) * (f64::from(plane[k]) - mean);
+                    Complex::from_polar(value, -std::f64::consts::TAU * turns)
+                })
+                .sum();
+            let expected = sum.norm_sqr() / (square * (h * w) as f64);
+            assert!((got - expected).abs() < 1e-9, "{i}: {got} for {expected}");
+        }
+    }
+
+    #[test]
+    fn a_ramp_has_no_power_at_high_frequencies() {
+        let (h, w) = (64, 64);
+        let plane: Vec<f32> = (0..h * w).map(|i| (i % w) as f32).collect();
+        let power = power_spectrum(&plane, (h, w));
+        let high: f64 = (16..48).map(|q| power[q]).sum();
+        assert!(high < 1e-4 * power.iter().sum::<f64>(), "{high}");
+    }
+}

@@ -1,0 +1,278 @@
+//! [`Torus`]: wavelet noise on the plane.
+
+use super::filters::hold;
+use super::{Detail, SPLINE_PRODUCTS, fourier, quantised, spline_weights, white};
+
+/// A torus of coefficients of wavelet noise on the plane, whose unit of length is one coefficient.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Torus {
+    rows: usize,
+    cols: usize,
+    integers: Vec<i16>,
+    /// The integers, scaled.
+    values: Vec<f32>,
+    scale: f32,
+}
+
+/// Rising positions on an axis of a torus: for each, which three neighbouring coefficients count, and how
+/// much.
+#[derive(Debug, Clone, Default)]
+pub struct Row {
+    /// The coefficients that any position needs: the first, and how many, round the torus.
+    start: usize,
+    span: usize,
+    /// The first of each position's three, counted from `start`.
+    first: Vec<u32>,
+    weights: [Vec<f32>; 3],
+}
+
+impl Row {
+    /// Of these positions, on a torus of `n` coefficients.
+    pub fn new(positions: impl Iterator<Item = f64>, n: usize) -> Self {
+        let mut row = Self::default();
+        let mut firsts = Vec::new();
+        for position in positions {
+            let (first, weights) = spline_weights(position);
+            firsts.push(first);
+            for (all, w) in row.weights.iter_mut().zip(weights) {
+                all.push(w);
+            }
+        }
+        let (Some(&least), Some(&most)) = (firsts.first(), firsts.last()) else {
+            return row;
+        };
+        // All of them at most, and two again so that three always follow each other.
+        row.span = (most - least + 3.0).min((n + 2) as f64) as usize;
+        row.start = wrapped(least, n);
+        row.first = firsts.into_iter().map(|first| wrapped(first - least, n) as u32).collect();
+        row
+    }
+}
+
+/// A whole number on a torus of `n`, which may be far away.
+#[inline]
+fn wrapped(position: f64, n: usize) -> usize {
+    // Exact: whole numbers below 2^53, and larger ones are whole by themselves.
+    position.rem_euclid(n as f64) as usize % n
+}
+
+impl Torus {
+    /// Side of the torus of textures that need not tile.
+    pub const SIDE: usize = 256;
+
+    /// The coefficients of an even number of `rows` and of `cols` (at least 2 each).
+    pub fn new((rows, cols): (usize, usize), detail: Detail) -> Self {
+        assert!(rows >= 2 && cols >= 2 && rows % 2 == 0 && cols % 2 == 0, "{rows}x{cols}");
+        let coefficients = if detail == Detail::Square {
+            square((rows, cols))
+        } else {
+            let mut plane = white_plane((rows, cols), 2);
+            fourier::filter(&mut plane, [rows, cols], |[fy, fx]| {
+                detail.amplitude([fx, fy]).unwrap_or(1.0)
+            });
+            plane
+        };
+        let (integers, scale) =
+            quantised(&coefficients, |integers| variance(integers, (rows, cols)));
+        let values = integers.iter().map(|&v| f32::from(v) * scale).collect();
+        Self { rows, cols, integers, values, scale }
+    }
+
+    /// Numbers of rows and columns.
+    pub fn shape(&self) -> (usize, usize) {
+        (self.rows, self.cols)
+    }
+
+    /// The coefficients as the format has them, row by row.
+    pub fn integers(&self) -> &[i16] {
+        &self.integers
+    }
+
+    /// By what an integer is multiplied to become a coefficient of noise of unit variance.
+    pub fn scale(&self) -> f32 {
+        self.scale
+    }
+
+    /// The noise at position (x, y): of mean 0 and, over all positions, variance 1.
+    #[inline]
+    pub fn at(&self, x: f64, y: f64) -> f32 {
+        let (left, wx) = spline_weights(x);
+        let (top, wy) = spline_weights(y);
+        let next = |i: usize, n: usize| if i + 1 == n { 0 } else { i + 1 };
+        let y0 = wrapped(top, self.rows);
+        let y1 = next(y0, self.rows);
+        let rows = [y0, y1, next(y1, self.rows)].map(|y| y * self.cols);
+        let mut x = wrapped(left, self.cols);
+        let mut sum = 0.0;
+        for (k, wx) in wx.into_iter().enumerate() {
+            let [a, b, c] = rows.map(|row| self.values[row + x]);
+            let value = wx * ((wy[0] * a + wy[1] * b) + wy[2] * c);
+            sum = if k == 0 { value } else { sum + value };
+            x = next(x, self.cols);
+        }
+        sum
+    }
+
+    /// Adds `weight` times the noise at the positions of `xs` and height `y` to `sums`: the same bits as
+    /// [`Torus::at`] gives. `combined` is scratch space.
+    pub fn add_row(
+        &self,
+        xs: &Row,
+        y: f64,
+        weight: f32,
+        combined: &mut Vec<f32>,
+        sums: &mut [f32],
+    ) {
+        let (top, wy) = spline_weights(y);
+        let rows: [&[f32]; 3] = std::array::from_fn(|k| {
+            let row = (wrapped(top, self.rows) + k) % self.rows;
+            &self.values[row * self.cols..][..self.cols]
+        });
+        combined.clear();
+        let mut at = xs.start;
+        while combined.len() < xs.span {
+            let run = (xs.span - combined.len()).min(self.cols - at);
+            let [a, b, c] = rows.map(|row| &row[at..at + run]);
+            let columns = a.iter().zip(b).zip(c);
+            combined.extend(columns.map(|((a, b), c)| (wy[0] * a + wy[1] * b) + wy[2] * c));
+            at = 0;
+        }
+        let [w0, w1, w2] = &xs.weights;
+        let positions = xs.first.iter().zip(w0.iter().zip(w1).zip(w2));
+        for (sum, (&first, ((w0, w1), w2))) in sums.iter_mut().zip(positions) {
+            let v = &combined[first as usize..][..3];
+            *sum += weight * ((w0 * v[0] + w1 * v[1]) + w2 * v[2]);
+        }
+    }
+}
+
+fn white_plane((rows, cols): (usize, usize), stream: u32) -> Vec<f64> {
+    let index = |i: usize| ((i / cols) as u32) << 16 | (i % cols) as u32;
+    (0..rows * cols).map(|i| f64::from(white(stream, index(i)))).collect()
+}
+
+/// Coefficients of Cook and DeRose's noise: a sum of two, each white noise without what half the
+/// resolution holds. The second is moved by an odd number of coefficients along both axes, so that its
+/// pairs of coefficients that share one of half the resolution lie elsewhere. (Cook and DeRose move a
+/// copy of the first: then everything is there twice.)
+fn square((rows, cols): (usize, usize)) -> Vec<f64> {
+    let [first, second] = [0, 1].map(|stream| {
+        let white = white_plane((rows, cols), stream);
+        let held = held(&held(&white, cols, true), cols, false);
+        white.iter().zip(&held).map(|(w, h)| w - h).collect::<Vec<_>>()
+    });
+    let moved = |i: usize, n: usize| (i + ((n / 2) | 1)) % n;
+    let both = |i: usize| first[i] + second[moved(i / cols, rows) * cols + moved(i % cols, cols)];
+    (0..rows * cols).map(both).collect()
+}
+
+/// What half the resolution along x, or along y, can hold of a plane.
+fn held(plane: &[f64], cols: usize, along_x: bool) -> Vec<f64> {
+    let mut out = plane.to_vec();
+    let mut half = Vec::new();
+    if along_x {
+        out.chunks_exact_mut(cols).for_each(|line| hold(line, &mut half));
+    } else {
+        let mut line = Vec::new();
+        for x in 0..cols {
+            line.clear();
+            line.extend(out[x..].iter().step_by(cols));
+            hold(&mut line, &mut half);
+            out[x..].iter_mut().step_by(cols).zip(&line).for_each(|(o, v)| *o = *v);
+        }
+    }
+    out
+}
+
+/// Variance of the spline surface over these coefficients, averaged over all positions: sums of integers.
+fn variance(integers: &[i16], (rows, cols): (usize, usize)) -> f64 {
+    let around = |i: usize, by: usize, n: usize| (i + n * 2 + by - 2) % n;
+    let mut total = 0i128;
+    for (dy, py) in SPLINE_PRODUCTS.into_iter().enumerate() {
+        for (dx, px) in SPLINE_PRODUCTS.into_iter().enumerate() {
+            let mut products = 0i64;
+            for y in 0..rows {
+                let row = &integers[y * cols..][..cols];
+                let other = &integers[around(y, dy, rows) * cols..][..cols];
+                for x in 0..cols {
+                    products += i64::from(row[x]) * i64::from(other[around(x, dx, cols)]);
+                }
+            }
+            total += i128::from(products) * i128::from(py * px);
+        }
+    }
+    let mean = integers.iter().map(|&v| i64::from(v)).sum::<i64>() as f64 / integers.len() as f64;
+    total as f64 / (120.0 * 120.0 * integers.len() as f64) - mean * mean
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Part;
+    use super::*;
+
+    fn positions(n: usize, step: f64) -> impl Iterator<Item = (f64, f64)> {
+        (0..n * n).map(move |i| ((i / n) as f64 * step, (i % n) as f64 * step))
+    }
+
+    #[test]
+    fn its_variance_is_one_and_its_mean_nothing() {
+        let oriented = Detail::Axes([Part::Low, Part::Band]);
+        for detail in [Detail::Square, Detail::Round, Detail::RoundFine, oriented] {
+            for shape in [(256, 256), (16, 48), (4, 4)] {
+                let torus = Torus::new(shape, detail);
+                let n = 4 * shape.0.max(shape.1);
+                let all: Vec<f64> = positions(n, 0.25)
+                    .map(|(x, y)| f64::from(torus.at(x + 0.125, y + 0.125)))
+                    .collect();
+                let mean = all.iter().sum::<f64>() / all.len() as f64;
+                let square =
+                    all.iter().map(|v| v * v).sum::<f64>() / all.len() as f64 - mean * mean;
+                assert!((square - 1.0).abs() < 0.02, "{detail:?} {shape:?}: {square}");
+                if detail != oriented {
+                    assert!(mean.abs() < 0.01, "{detail:?} {shape:?}: {mean}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_row_has_the_same_bits_as_its_points() {
+        let torus = Torus::new((16, 24), Detail::Square);
+        for step in [0.0, 0.01, 0.37, 1.0, 3.1] {
+            let xs = |i: usize| i as f64 * step - 50.3;
+            let row = Row::new((0..400).map(xs), 24);
+            for y in [-31.25, 0.0, 0.5, 7.77, 1e6] {
+                let mut sums = vec![0.0; 400];
+                torus.add_row(&row, y, 0.7, &mut Vec::new(), &mut sums);
+                for (i, &sum) in sums.iter().enumerate() {
+                    assert_eq!(sum, 0.0 + 0.7 * torus.at(xs(i), y), "at {i}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn it_goes_round() {
+        let torus = Torus::new((6, 10), Detail::Square);
+        for (x, y) in positions(12, 0.7) {
+            assert_eq!(torus.at(x, y), torus.at(x + 10.0 * 8.0, y - 6.0 * 16.0));
+        }
+    }
+
+    #[test]
+    fn all_cells_are_alike() {
+        // Without the second part of the sum the pairs of coefficients that share one of half the resolution show.
+        let torus = Torus::new((256, 256), Detail::Square);
+        let variance = |dx: f64, dy: f64| {
+            let square = |(x, y): (f64, f64)| f64::from(torus.at(x + dx, y + dy)).powi(2);
+            positions(128, 2.0).map(square).sum::<f64>() / (128.0 * 128.0)
+        };
+        for (x, y) in [(0.5, 0.5), (0.0, 0.5), (0.0, 0.0)] {
+            let all = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)]
+                .map(|(i, j)| variance(x + i, y + j));
+            let most = all.into_iter().fold(0.0, f64::max);
+            let least = all.into_iter().fold(f64::MAX, f64::min);
+            assert!(most < 1.1 * least, "{x} {y}: {all:?}");
+        }
+    }
+}

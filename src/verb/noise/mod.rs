@@ -1,0 +1,217 @@
+//! Procedural textures by example: [`fit_noise`] and [`NoiseTexture`].
+
+mod params;
+mod texture;
+
+use std::time::Instant;
+
+use serde::Serialize;
+
+use crate::base::ctx::Ctx;
+use crate::base::error::{Error, Result};
+use crate::base::memory::ensure_available;
+use crate::image::mask::Mask;
+use crate::image::material::MapKind;
+use crate::image::picture::{Encoding, Picture};
+use crate::method::noise::document::MOST_CHANNELS;
+use crate::method::noise::fit::{self, Exemplar};
+use crate::method::noise::{BandShape, Document, MapSpec, Model, Score};
+
+pub use params::{Bands, Histogram, NoiseParams, Weights};
+pub use texture::{NoiseTexture, RenderParams, SampleType};
+
+/// Shortest side of a photo that can be fitted: a few bands.
+const SMALLEST: usize = 16;
+
+/// A map of a material to fit: its name, what its numbers are, and its samples.
+#[derive(Debug, Clone, Copy)]
+pub struct NamedMap<'a> {
+    /// Its name: `basecolor`, `roughness`, ...
+    pub name: &'a str,
+    /// What its numbers are.
+    pub kind: MapKind,
+    /// Its samples. All maps have one size.
+    pub picture: &'a Picture,
+}
+
+/// How a texture was fitted.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NoiseReport {
+    /// Version of texforge.
+    pub version: &'static str,
+    /// Every parameter as text.
+    pub params: Vec<(&'static str, String)>,
+    /// Width and height of the photo in pixels.
+    pub photo_size: (usize, usize),
+    /// Number of bands.
+    pub bands: usize,
+    /// Bytes of the document.
+    pub bytes: usize,
+    /// Wall time in seconds of each stage, in order. The only part that differs between runs.
+    pub seconds: Vec<(&'static str, f64)>,
+    /// What the user should know, one sentence each.
+    pub notes: Vec<String>,
+}
+
+/// Fits a procedural texture to a photo, or to all maps of a material together: what remains is about a
+/// kilobyte from which values are evaluated anywhere.
+///
+/// The maps' channels are made independent of each other by the eigenvectors of their covariance, each
+/// is given the photo's histogram and the power of each octave of its spectrum (Lagae et al. 2009,
+/// sections 4 to 7). So maps stay correlated as they are in the photo. Transparent and masked pixels do
+/// not count; alpha itself is not fitted.
+///
+/// The same maps, mask and parameters give the same document on any number of threads.
+///
+/// # Errors
+/// [`Error::Parameter`] for a parameter out of range, no map or two of one name; [`Error::TooSmall`] below
+/// 16 x 16 pixels; [`Error::SizeMismatch`] if a map or the mask has another size than the first map;
+/// [`Error::NotFinite`]; [`Error::EmptyMask`]; [`Error::BadPicture`] if all is of one colour;
+/// [`Error::Memory`]; [`Error::Cancelled`].
+pub fn fit_noise(
+    ctx: &Ctx,
+    maps: &[NamedMap],
+    mask: Option<&Mask>,
+    params: &NoiseParams,
+) -> Result<(NoiseTexture, NoiseReport)> {
+    params.validate()?;
+    ctx.install(|| run(ctx, maps, mask, params))
+}
+
+fn run(
+    ctx: &Ctx,
+    maps: &[NamedMap],
+    mask: Option<&Mask>,
+    params: &NoiseParams,
+) -> Result<(NoiseTexture, NoiseReport)> {
+    let begun = Instant::now();
+    let (height, width) = checked(maps)?;
+    let mut notes = Vec::new();
+    let usable = usable(maps, mask)?;
+    let planes: Vec<Vec<f32>> = maps.iter().flat_map(|map| planes(map.picture)).collect();
+    let prepared = begun.elapsed().as_secs_f64();
+    ctx.begin(fit::STEPS + planes.len() as u64);
+    let exemplar = Exemplar {
+        planes: &planes,
+        shape: (height, width),
+        usable: usable.as_ref().map(Mask::usable),
+    };
+    let shape = match params.bands {
+        Bands::Round => BandShape::Round,
+        Bands::Square => BandShape::Square,
+    };
+    let options = fit::Options {
+        shape,
+        direct: params.weights == Weights::Direct,
+        histogram: params.histogram == Histogram::Kept,
+    };
+    let fitted = fit::fit(ctx, &exemplar, options)?;
+    if maps.iter().any(|map| map.picture.alpha_channel().is_some()) {
+        notes.push("alpha says where the photo counts; the texture has none".into());
+    }
+    let document = Document::new(
+        ctx.seed as u32,
+        [width as u32, height as u32],
+        maps.iter().map(spec).collect(),
+        fitted.mean,
+        fitted.matrix,
+        Model::Wavelet { bands: shape, channels: fitted.channels },
+        Score { fit: 0.0, recommended: "wavelet".into() },
+    );
+    let texture = NoiseTexture::new(document);
+    let report = NoiseReport {
+        version: env!("CARGO_PKG_VERSION"),
+        params: params.show(),
+        photo_size: (width, height),
+        bands: texture.document().terms().len(),
+        bytes: texture.to_json().len(),
+        seconds: vec![("read", prepared), ("fit", begun.elapsed().as_secs_f64() - prepared)],
+        notes,
+    };
+    Ok((texture, report))
+}
+
+/// The size that all maps have.
+fn checked(maps: &[NamedMap]) -> Result<(usize, usize)> {
+    let Some(first) = maps.first() else {
+        return Err(Error::parameter("maps", "at least one map", "none"));
+    };
+    let (height, width) = (first.picture.height(), first.picture.width());
+    if height.min(width) < SMALLEST {
+        let (what, remedy) = ("the photo".into(), "take a larger one".into());
+        return Err(Error::TooSmall { what, width, height, need: SMALLEST, remedy });
+    }
+    let mut channels = 0;
+    for (i, map) in maps.iter().enumerate() {
+        if maps[..i].iter().any(|other| other.name == map.name) {
+            return Err(Error::parameter(
+                "maps",
+                "maps of different names",
+                format!("two called `{}`", map.name),
+            ));
+        }
+        let (got_h, got_w) = (map.picture.height(), map.picture.width());
+        if (got_h, got_w) != (height, width) {
+            return Err(Error::SizeMismatch {
+                what: format!("the map `{}`", map.name),
+                got_w,
+                got_h,
+                want_w: width,
+                want_h: height,
+                remedy: "maps are fitted pixel by pixel: scale it".into(),
+            });
+        }
+        map.picture.ensure_finite(&format!("the map `{}`", map.name))?;
+        channels += colour_channels(map.picture);
+    }
+    if channels > MOST_CHANNELS {
+        let expected = format!("maps of at most {MOST_CHANNELS} channels in all");
+        return Err(Error::parameter("maps", expected, channels));
+    }
+    // Planes, their projection, and complex numbers of double width twice for a transform.
+    let per_pixel = (channels * 4 + 4 + 2 * 16 + 8) as u64;
+    let need = per_pixel.checked_mul((height * width) as u64);
+    ensure_available("the analysis of the photo", need)?;
+    Ok((height, width))
+}
+
+/// Where all maps and the mask say that the photo counts; `None` is everywhere.
+fn usable(maps: &[NamedMap], mask: Option<&Mask>) -> Result<Option<Mask>> {
+    let (height, width) = (maps[0].picture.height(), maps[0].picture.width());
+    if let Some(mask) = mask {
+        mask.ensure_size("the mask", height, width)?;
+    }
+    let alphas = maps.iter().filter_map(|map| Mask::from_alpha(map.picture));
+    let all = mask.cloned().into_iter().chain(alphas).map(Ok);
+    let usable = all.reduce(|a, b| a?.and(&b?)).transpose()?;
+    if let Some(mask) = usable.as_ref().filter(|mask| mask.count() < SMALLEST * SMALLEST) {
+        return Err(Error::EmptyMask { usable: mask.count(), patch: SMALLEST });
+    }
+    Ok(usable.filter(|mask| mask.count() < mask.usable().len()))
+}
+
+/// Number of channels without alpha.
+fn colour_channels(picture: &Picture) -> usize {
+    picture.channels() - usize::from(picture.alpha_channel().is_some())
+}
+
+fn planes(picture: &Picture) -> Vec<Vec<f32>> {
+    let (n, channels) = (picture.height() * picture.width(), picture.channels());
+    let plane = |c| (0..n).map(|i| picture.samples().unit(i * channels + c) as f32).collect();
+    (0..colour_channels(picture)).map(plane).collect()
+}
+
+fn spec(map: &NamedMap) -> MapSpec {
+    use crate::base::params::Value;
+    let encoding = match map.picture.encoding {
+        Encoding::Srgb => "srgb",
+        Encoding::Linear => "linear",
+        Encoding::Data => "data",
+    };
+    MapSpec {
+        name: map.name.to_owned(),
+        kind: map.kind.show(),
+        encoding: encoding.into(),
+        channels: colour_channels(map.picture),
+    }
+}
