@@ -88,10 +88,9 @@ def render_materialx(path: Path, element: str, size: tuple[int, int]) -> Picture
             texture.repeat_x, texture.repeat_y = sampled.repeated
             if not sampled.closest:
                 texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
-        corners = np.array([(-1, -1, 0), (3, -1, 0), (-1, 3, 0)], np.float32)
-        columns: dict[str, Picture] = {
-            "i_position": corners,
-            "i_texcoord_0": (corners[:, :2] + 1) / 2,
+        columns = {
+            "i_position": np.array([(-1, -1, 0), (3, -1, 0), (-1, 3, 0)], np.float32),
+            "i_texcoord_0": np.array([(0, 0), (2, 0), (0, 2)], np.float32),
         }
         buffers = [
             (gl.buffer(values.tobytes()), f"{values.shape[1]}f", name)
