@@ -6,6 +6,8 @@ PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11 p
 CARGO ?= cargo
 VENV := .venv
 BIN := $(VENV)/bin
+BLENDER_PYTHON ?= python3.11
+BLENDER_VENV := .venv-blender
 WHEELS := target/wheels
 PHOTO ?=
 BENCH ?=
@@ -15,7 +17,7 @@ QUALITY ?=
 LATTICES ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-rust test-python lint format gallery quality lattices extracts regular-gallery readme-pictures bench bench-peers bench-record wheel ci fuzz clean
+.PHONY: help setup demo test test-rust test-python test-blender lint format gallery quality lattices extracts regular-gallery readme-pictures bench bench-peers bench-record wheel ci fuzz clean
 
 help: ## List the targets.
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -52,6 +54,17 @@ test-rust:
 test-python: $(BIN)/.ready
 	$(call install_wheel,dev)
 	$(BIN)/python -m pytest
+
+# The shaders in Blender, whose wheel takes 1 GB and one version of Python: an environment of its own.
+$(BLENDER_VENV)/.ready: pyproject.toml
+	@command -v $(BLENDER_PYTHON) >/dev/null || { echo "Blender's wheel needs Python 3.11 (with venv); install it, or name it: make BLENDER_PYTHON=..." >&2; exit 1; }
+	$(BLENDER_PYTHON) -m venv $(BLENDER_VENV)
+	$(BLENDER_VENV)/bin/python -c 'import tomllib; print("\n".join(tomllib.load(open("pyproject.toml", "rb"))["dependency-groups"]["blender"]))' > $(BLENDER_VENV)/requirements.txt
+	$(BLENDER_VENV)/bin/python -m pip install --quiet --disable-pip-version-check -r $(BLENDER_VENV)/requirements.txt
+	touch $@
+
+test-blender: $(BLENDER_VENV)/.ready ## Compile and render the OSL and Blender exports in Blender (1 GB).
+	$(BLENDER_VENV)/bin/python -m pytest tests/blender
 
 lint: $(BIN)/.ready ## Check formatting, lints and types.
 	$(CARGO) fmt --check
@@ -110,4 +123,4 @@ fuzz: export HYPOTHESIS_PROFILE = thorough
 fuzz: test ## Run every test with many random cases (hours).
 
 clean: ## Remove what was built.
-	rm -rf target $(VENV) demo gallery lattices extracts regular-gallery dist
+	rm -rf target $(VENV) $(BLENDER_VENV) demo gallery lattices extracts regular-gallery dist
