@@ -116,29 +116,12 @@ pub struct Band {
     /// Along each direction.
     pub levels: [u32; 2],
     /// Which frequencies along each direction.
-    pub parts: [BandPart; 2],
-}
-
-/// Which frequencies of its level a band has along one direction.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum BandPart {
-    /// All up to its octave.
-    Low,
-    /// Its octave.
-    Band,
-    /// Its octave and all above.
-    Fine,
+    pub parts: [Part; 2],
 }
 
 impl Band {
     fn term(&self) -> Term {
-        let part = |p: BandPart| match p {
-            BandPart::Low => Part::Low,
-            BandPart::Band => Part::Band,
-            BandPart::Fine => Part::Fine,
-        };
-        Term { levels: self.levels, detail: Detail::Axes(self.parts.map(part)) }
+        Term { levels: self.levels, detail: Detail::Axes(self.parts) }
     }
 }
 
@@ -160,7 +143,7 @@ pub struct Channel {
 pub struct Score {
     /// How well this texture fits the photo.
     pub fit: f64,
-    /// `wavelet`, `oriented`, `tiling` or `none`: what fits it best.
+    /// `wavelet`, `oriented` or `none`: what fits it best.
     pub recommended: String,
 }
 

@@ -5,14 +5,12 @@ use rayon::prelude::*;
 use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
 use crate::method::noise::document::{BandShape, Channel, MOST_LEVEL, Term};
-use crate::method::noise::shape::{KNOTS, Shape};
-use crate::signal::normal;
+use crate::method::noise::ranks::Ranks;
+use crate::method::noise::score::Structure;
+use crate::method::noise::shape::Shape;
 use crate::signal::power::{power_spectrum, transform_even};
 use crate::signal::symmetric::eigen;
-use crate::signal::wavelet_noise::spectrum::{expected, signs};
-
-/// Steps of progress that [`fit`] counts, but for one for each channel.
-pub const STEPS: u64 = 2;
+use crate::signal::wavelet_noise::spectrum::{expected, octave, signs};
 
 /// A channel whose variance is below this share of all is rounding error.
 const LEAST_SHARE: f64 = 1e-7;
@@ -52,7 +50,7 @@ pub struct Exemplar<'a> {
 
 impl Exemplar<'_> {
     /// Whether sample `i` is usable.
-    fn counts(&self, i: usize) -> bool {
+    pub(super) fn counts(&self, i: usize) -> bool {
         self.usable.is_none_or(|usable| usable[i])
     }
 }
@@ -63,14 +61,43 @@ pub fn levels((rows, cols): (usize, usize)) -> u32 {
     (rows.min(cols).ilog2() - 1).min(MOST_LEVEL + 1)
 }
 
-/// Fits isotropic wavelet noise to all planes together (sections 4 to 7).
-///
-/// The result depends on the planes alone. The last bits of the Fourier transforms, which may differ
-/// between CPUs, are rounded away when the document is made.
+/// What the analysis of planes has in common, whatever noise is fitted to it.
+#[derive(Debug)]
+pub struct Analysis {
+    mean: Vec<f64>,
+    /// Unit vectors of the independent channels.
+    axes: Vec<Vec<f64>>,
+    /// Of every independent channel.
+    pub(super) spectra: Vec<Spectrum>,
+    /// What noise cannot hold of the strongest.
+    pub structure: Structure,
+}
+
+/// The spectrum that a channel's noise shall have.
+#[derive(Debug)]
+pub(super) struct Spectrum {
+    /// Power at every frequency of the transform.
+    pub(super) power: Vec<f64>,
+    /// The histogram's values at the knots.
+    pub(super) histogram: Option<Vec<f64>>,
+    /// What noise cannot hold of it; measured of the strongest channel alone.
+    structure: Option<Structure>,
+}
+
+impl Analysis {
+    /// The fit with these channels.
+    pub(super) fn with_channels(&self, channels: Vec<Channel>) -> Fit {
+        let row = |i: usize| self.axes.iter().map(|axis| axis[i]).collect();
+        let matrix = (0..self.mean.len()).map(row).collect();
+        Fit { mean: self.mean.clone(), matrix, channels }
+    }
+}
+
+/// Independent channels and their spectra (sections 5 and 6); a step of progress to a plane and one more.
 ///
 /// # Errors
 /// [`Error::BadPicture`] if all planes are constant; [`Error::Cancelled`].
-pub fn fit(ctx: &Ctx, exemplar: &Exemplar, options: Options) -> Result<Fit> {
+pub fn analyse(ctx: &Ctx, exemplar: &Exemplar, options: Options) -> Result<Analysis> {
     let mean = means(exemplar);
     let axes = eigen(&covariance(exemplar, &mean));
     ctx.step(1)?;
@@ -85,19 +112,32 @@ pub fn fit(ctx: &Ctx, exemplar: &Exemplar, options: Options) -> Result<Fit> {
                     .into(),
         });
     }
-    let chosen: Vec<_> = axes.iter().filter(|(v, _)| *v > LEAST_SHARE * total).collect();
-    let bands = Bands::new(exemplar.shape, options.shape);
-    ctx.step(1)?;
-    let channel = |(_, axis): &&(f64, Vec<f64>)| {
-        let plane = along(exemplar, &mean, axis);
-        let channel = fit_channel(plane, exemplar, &bands, options);
+    let chosen = axes.into_iter().filter(|(variance, _)| *variance > LEAST_SHARE * total);
+    let axes: Vec<Vec<f64>> = chosen.map(|(_, axis)| axis).collect();
+    let spectrum = |(k, axis): (usize, &Vec<f64>)| {
+        let spectrum = spectrum(along(exemplar, &mean, axis), exemplar, options, k == 0);
         ctx.step(1)?;
-        Ok(channel)
+        Ok(spectrum)
     };
-    let channels = chosen.iter().map(channel).collect::<Result<Vec<_>>>()?;
-    let matrix =
-        (0..mean.len()).map(|i| chosen.iter().map(|(_, axis)| axis[i]).collect()).collect();
-    Ok(Fit { mean, matrix, channels })
+    let spectra = axes.iter().enumerate().map(spectrum).collect::<Result<Vec<_>>>()?;
+    let structure = spectra[0].structure.unwrap_or(Structure::NONE);
+    Ok(Analysis { mean, axes, spectra, structure })
+}
+
+/// Fits isotropic wavelet noise to all planes together (section 4).
+///
+/// The result depends on the planes alone. The last bits of the Fourier transforms, which may differ
+/// between CPUs, are rounded away when the document is made.
+pub fn fit(analysis: &Analysis, shape: (usize, usize), options: Options) -> Fit {
+    let bands = Bands::new(shape, options.shape);
+    let channel = |spectrum: &Spectrum| {
+        let powers = bands.powers(&spectrum.power);
+        let squares =
+            if options.direct { powers } else { least_squares(&bands.leakage, &powers, 0.0) };
+        let weights = squares.into_iter().map(f64::sqrt).collect();
+        Channel { weights, histogram: spectrum.histogram.clone() }
+    };
+    analysis.with_channels(analysis.spectra.iter().map(channel).collect())
 }
 
 /// Sums of `value` over the usable samples, in the same order for any number of threads.
@@ -156,18 +196,6 @@ struct Bands {
     leakage: Vec<Vec<f64>>,
 }
 
-/// The octave of a frequency in cycles a pixel (the paper's equation 10): of `levels`, the finest also has
-/// all above, the coarsest all below.
-fn octave(fx: f64, fy: f64, levels: usize) -> usize {
-    let f = fx.max(fy);
-    let mut lower = 0.25;
-    let mut octave = 0;
-    while f < lower && octave + 1 < levels {
-        (lower, octave) = (lower / 2.0, octave + 1);
-    }
-    octave
-}
-
 impl Bands {
     fn new(shape: (usize, usize), noise: BandShape) -> Self {
         let (rows, cols) = shape;
@@ -178,10 +206,10 @@ impl Bands {
             let power = expected(detail, at, shape);
             for (r, line) in power.chunks(cols / 2 + 1).enumerate() {
                 for (q, power) in line.iter().enumerate() {
-                    // The mean is taken out.
+                    // The paper's octaves, equation 10. The mean is taken out.
                     if r + q > 0 {
                         let (fx, fy) = (q as f64 / cols as f64, r as f64 / rows as f64);
-                        sums[octave(fx, fy, levels)] += power * signs(q, cols) * signs(r, rows);
+                        sums[octave(fx.max(fy), levels)] += power * signs(q, cols) * signs(r, rows);
                     }
                 }
             }
@@ -205,7 +233,7 @@ impl Bands {
                 let mut sums = vec![0.0; levels];
                 for (q, power) in line.iter().enumerate() {
                     let fx = q.min(cols - q) as f64 / cols as f64;
-                    sums[octave(fx, fy, levels)] += power;
+                    sums[octave(fx.max(fy), levels)] += power;
                 }
                 sums
             })
@@ -216,30 +244,34 @@ impl Bands {
     }
 }
 
-/// Histogram and weights of one independent channel.
-fn fit_channel(
-    mut plane: Vec<f32>,
+/// Histogram and spectrum of one independent channel, and on demand what noise cannot hold of it.
+fn spectrum(
+    plane: Vec<f32>,
     exemplar: &Exemplar,
-    bands: &Bands,
     options: Options,
-) -> Channel {
+    with_structure: bool,
+) -> Spectrum {
     let usable = exemplar.usable.map_or(plane.len(), |u| u.iter().filter(|u| **u).count());
     let variance = sum(exemplar, |i| f64::from(plane[i]).powi(2)) / usable as f64;
-    let ranks = options.histogram.then(|| Ranks::new(&plane, exemplar, variance));
-    if let Some(ranks) = ranks.as_ref().filter(|_| options.direct) {
-        ranks.gaussianise(&mut plane, exemplar);
-    }
     // What is masked out is the mean, and has no power.
     let gain = plane.len() as f64 / usable as f64;
-    let mut power = power_spectrum(&plane, exemplar.shape);
-    power.iter_mut().for_each(|p| *p *= gain);
-    if let Some(ranks) = ranks.as_ref().filter(|_| !options.direct) {
-        power = before_shape(&ranks.shape(), &power, exemplar.shape);
-    }
-    let powers = bands.powers(&power);
-    let squares = if options.direct { powers } else { least_squares(&bands.leakage, &powers) };
-    let weights = squares.into_iter().map(f64::sqrt).collect();
-    Channel { weights, histogram: ranks.map(|ranks| ranks.knots.to_vec()) }
+    let power = |plane: &[f32]| {
+        let mut power = power_spectrum(plane, exemplar.shape);
+        power.iter_mut().for_each(|p| *p *= gain);
+        power
+    };
+    let ranks = Ranks::new(&plane, exemplar, variance);
+    let normal = (with_structure || options.direct).then(|| ranks.gaussianised(&plane, exemplar));
+    let power = match &normal {
+        Some(normal) if options.direct && options.histogram => power(normal),
+        _ if options.direct || !options.histogram => power(&plane),
+        _ => before_shape(&Shape::new(&ranks.knots), &power(&plane), exemplar.shape),
+    };
+    let structure = normal
+        .filter(|_| with_structure)
+        .map(|normal| Structure::of(&normal, exemplar.shape, &power));
+    let histogram = options.histogram.then(|| ranks.knots.to_vec());
+    Spectrum { power, histogram, structure }
 }
 
 /// The spectrum that noise must have for its values to have the spectrum `power` once `shape` has brought
@@ -272,99 +304,14 @@ fn before_shape(shape: &Shape, power: &[f64], size: (usize, usize)) -> Vec<f64> 
     transform_even(&correlation, size).iter().map(|p| p * scale).collect()
 }
 
-/// Levels of a plane's histogram.
-const STEPS_OF_VALUE: usize = 1 << 16;
-
-/// A plane's histogram.
-struct Ranks {
-    least: f32,
-    per_step: f64,
-    /// For every step of value, a normally distributed number of the same rank and the plane's variance.
-    normals: Vec<f32>,
-    /// The histogram's values at the knots, of mean 0 and exactly the plane's variance.
-    knots: [f64; KNOTS.len()],
-}
-
-impl Ranks {
-    fn new(plane: &[f32], exemplar: &Exemplar, variance: f64) -> Self {
-        let values =
-            || plane.iter().enumerate().filter(|(i, _)| exemplar.counts(*i)).map(|(_, v)| *v);
-        let (least, most) = values().fold((f32::MAX, f32::MIN), |(a, b), v| (a.min(v), b.max(v)));
-        let per_step = (STEPS_OF_VALUE - 1) as f64 / f64::from(most - least).max(f64::MIN_POSITIVE);
-        let mut ranks = Self { least, per_step, normals: Vec::new(), knots: [0.0; KNOTS.len()] };
-        let (mut counts, mut sums) = (vec![0u32; STEPS_OF_VALUE], vec![0.0f64; STEPS_OF_VALUE]);
-        for v in values() {
-            counts[ranks.step(v)] += 1;
-            sums[ranks.step(v)] += f64::from(v);
-        }
-        ranks.knots = knots(&counts, &sums, variance);
-        let total = f64::from(counts.iter().sum::<u32>());
-        let deviation = variance.sqrt();
-        // Equal samples share the middle of their ranks.
-        let mut below = 0.0;
-        let normal = |&count: &u32| {
-            let rank = below + 0.5 * f64::from(count);
-            below += f64::from(count);
-            if count == 0 { 0.0 } else { (normal::quantile(rank / total) * deviation) as f32 }
-        };
-        ranks.normals = counts.iter().map(normal).collect();
-        ranks
-    }
-
-    fn step(&self, value: f32) -> usize {
-        (f64::from(value - self.least) * self.per_step).round() as usize
-    }
-
-    fn shape(&self) -> Shape {
-        Shape::new(&self.knots)
-    }
-
-    /// Replaces the samples by normally distributed ones (section 5).
-    fn gaussianise(&self, plane: &mut [f32], exemplar: &Exemplar) {
-        for (_, v) in plane.iter_mut().enumerate().filter(|(i, _)| exemplar.counts(*i)) {
-            *v = self.normals[self.step(*v)];
-        }
-    }
-}
-
-/// Values at the knots: the mean of the samples whose ranks lie around each, then moved and stretched so
-/// that mean and variance are right.
-fn knots(counts: &[u32], sums: &[f64], variance: f64) -> [f64; KNOTS.len()] {
-    let total = f64::from(counts.iter().sum::<u32>());
-    // From half-way to the knot before to half-way to the one after, weighted towards the knot alone:
-    // a narrow window where the distribution is dense, a wide one in the tails.
-    let window = |i: usize| {
-        let u = KNOTS[i];
-        let half = |j: usize| 0.15 * (KNOTS[j] - u).abs();
-        let from = if i == 0 { 0.0 } else { normal::cumulative(u - half(i - 1)) };
-        let to = if i + 1 == KNOTS.len() { 1.0 } else { normal::cumulative(u + half(i + 1)) };
-        (from * total, to * total)
-    };
-    let mut values: [f64; KNOTS.len()] = std::array::from_fn(|i| {
-        let (from, to) = window(i);
-        let (mut below, mut sum) = (0.0, 0.0);
-        for (&count, &value) in counts.iter().zip(sums).filter(|(c, _)| **c > 0) {
-            let count = f64::from(count);
-            let inside = (to.min(below + count) - from.max(below)).max(0.0);
-            sum += inside * value / count;
-            below += count;
-        }
-        sum / (to - from)
-    });
-    for i in 1..values.len() {
-        values[i] = values[i].max(values[i - 1]);
-    }
-    let (mean, got) = Shape::new(&values).moments();
-    let gain = if got > 0.0 { (variance / got).sqrt() } else { 1.0 };
-    values.map(|v| (v - mean) * gain)
-}
-
-/// The non-negative x for which `matrix` x comes nearest to `target`, counted in shares of `target`: by
-/// coordinate descent, which ends at the least for so few unknowns.
-pub(super) fn least_squares(matrix: &[Vec<f64>], target: &[f64]) -> Vec<f64> {
+/// The non-negative x for which `matrix` x comes nearest to `target`, counted in shares of `target` (but
+/// of `least` times the largest at least): by coordinate descent, which ends at the least for so few
+/// unknowns.
+pub(super) fn least_squares(matrix: &[Vec<f64>], target: &[f64], least: f64) -> Vec<f64> {
     let most = target.iter().copied().fold(0.0, f64::max);
     // A band without power must not outweigh all others.
-    let weights: Vec<f64> = target.iter().map(|t| 1.0 / t.max(1e-6 * most).max(1e-30)).collect();
+    let weights: Vec<f64> =
+        target.iter().map(|t| 1.0 / t.max(least.max(1e-6) * most).max(1e-30)).collect();
     let n = matrix.first().map_or(0, Vec::len);
     let scaled: Vec<Vec<f64>> =
         matrix.iter().zip(&weights).map(|(row, w)| row.iter().map(|a| a * w).collect()).collect();
@@ -387,3 +334,134 @@ pub(super) fn least_squares(matrix: &[Vec<f64>], target: &[f64]) -> Vec<f64> {
 }
 
 const SWEEPS: usize = 2000;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::method::noise::{
+        Document, Evaluator, Filter, MapSpec, Model, Score, oriented, raster,
+    };
+
+    /// A grey photo of the noise of a model.
+    fn photo(model: Model, (rows, cols): (usize, usize)) -> Vec<Vec<f32>> {
+        let map = MapSpec {
+            name: "basecolor".into(),
+            kind: "color".into(),
+            encoding: "linear".into(),
+            channels: 1,
+        };
+        let score = Score { fit: 1.0, recommended: "wavelet".into() };
+        let document = Document::new(
+            5,
+            [cols as u32, rows as u32],
+            vec![map],
+            vec![0.3],
+            vec![vec![1.0]],
+            model,
+            score,
+        );
+        let ctx = Ctx::new(0, 1).expect("a context");
+        let view =
+            raster::View { size: (rows, cols), scale: 1.0, origin: [77.0, 5.0], tileable: false };
+        let evaluator = Evaluator::new(document);
+        vec![raster::render(&ctx, &evaluator, &view, Filter::NONE).expect("a picture")]
+    }
+
+    fn analysed(planes: &[Vec<f32>], shape: (usize, usize), options: Options) -> Analysis {
+        let ctx = Ctx::new(0, 1).expect("a context");
+        let exemplar = Exemplar { planes, shape, usable: None };
+        analyse(&ctx, &exemplar, options).expect("an analysis")
+    }
+
+    #[test]
+    fn weights_of_noise_are_found_again() {
+        // The paper's figure 5; the coarsest bands have few coefficients to tell their weight by.
+        let weights = vec![0.03, 0.05, 0.01, 0.06, 0.04, 0.02, 0.05];
+        let size = (300, 517);
+        for shape in [BandShape::Round, BandShape::Square] {
+            let channel = Channel { weights: weights.clone(), histogram: None };
+            let planes = photo(Model::Wavelet { bands: shape, channels: vec![channel] }, size);
+            let off = |direct: bool| {
+                let options = Options { shape, direct, histogram: false };
+                let found = fit(&analysed(&planes, size, options), size, options);
+                assert!((found.mean[0] - 0.3).abs() < 0.02);
+                let found = &found.channels[0].weights;
+                let pairs = found.iter().zip(&weights).take(5);
+                pairs.map(|(f, w)| (f / w).ln().abs()).fold(0.0, f64::max)
+            };
+            let (corrected, direct) = (off(false), off(true));
+            assert!(corrected < 0.2, "{shape:?}: {corrected}");
+            assert!(
+                corrected < 0.5 * direct,
+                "{shape:?}: {corrected}, {direct} by the paper's formula"
+            );
+        }
+    }
+
+    #[test]
+    fn shaped_noise_has_the_spectrum_that_was_asked_for() {
+        // Noise brought into a skewed histogram, fitted, and made again: octaves agree.
+        let knots = crate::method::noise::KNOTS.map(|u| 0.1 * libm::exp(0.8 * u));
+        let weights = vec![0.02, 0.05, 0.06, 0.03, 0.03, 0.03, 0.02];
+        let size = (512, 512);
+        let model = |weights, histogram| Model::Wavelet {
+            bands: BandShape::Round,
+            channels: vec![Channel { weights, histogram }],
+        };
+        let planes = photo(model(weights, Some(knots.to_vec())), size);
+        let off = |direct: bool| {
+            let options = Options { shape: BandShape::Round, direct, histogram: true };
+            let found = fit(&analysed(&planes, size, options), size, options).channels.remove(0);
+            let again = photo(model(found.weights, found.histogram), size);
+            let bands = Bands::new(size, BandShape::Round);
+            let powers = [&planes, &again].map(|p| bands.powers(&power_spectrum(&p[0], size)));
+            let pairs = powers[0].iter().zip(&powers[1]).take(5);
+            let decibels = pairs.map(|(a, b)| 10.0 * (a / b).log10().abs());
+            decibels.sum::<f64>() / 5.0
+        };
+        let (corrected, direct) = (off(false), off(true));
+        assert!(corrected < 0.4, "{corrected} dB");
+        assert!(corrected < 0.5 * direct, "{corrected} dB, {direct} dB by the paper's formula");
+    }
+
+    #[test]
+    fn grain_is_found_again() {
+        use crate::method::noise::Band;
+        use crate::signal::wavelet_noise::Part;
+        let size = (256, 320);
+        for angle in [0.0, 25.0, -60.0] {
+            let band = |levels, parts| Band { levels, parts };
+            let bands = vec![
+                band([1, 4], [Part::Band, Part::Band]),
+                band([2, 5], [Part::Band, Part::Band]),
+            ];
+            let channel = Channel { weights: vec![0.05, 0.08], histogram: None };
+            let planes = photo(Model::Oriented { angle, bands, channels: vec![channel] }, size);
+            let options = Options { shape: BandShape::Round, direct: false, histogram: false };
+            let analysis = analysed(&planes, size, options);
+            let structure = analysis.structure;
+            assert!(structure.oriented_fit() > 3.0 * structure.isotropic_fit(), "{structure:?}");
+            let found = oriented::fit(&analysis, size);
+            assert!((found.angle - angle).abs() < 2.0, "{} for {angle}", found.angle);
+            let weights = &found.fit.channels[0].weights;
+            let of = |levels: [u32; 2]| -> f64 {
+                let all = found.bands.iter().zip(weights);
+                all.filter(|(b, _)| b.levels == levels).map(|(_, w)| *w).sum()
+            };
+            assert!((of([1, 4]) / 0.05 - 1.0).abs() < 0.25, "{angle}: {}", of([1, 4]));
+            assert!((of([2, 5]) / 0.08 - 1.0).abs() < 0.25, "{angle}: {}", of([2, 5]));
+        }
+    }
+
+    #[test]
+    fn least_squares_are_least() {
+        let matrix = vec![vec![1.0, 0.2, 0.0], vec![0.3, 1.0, 0.1], vec![0.0, 0.4, 1.0]];
+        let x = least_squares(&matrix, &[1.4, 2.6, 3.8], 0.0);
+        for (x, expected) in x.iter().zip([1.0, 2.0, 3.0]) {
+            assert!((x - expected).abs() < 1e-9, "{x} for {expected}");
+        }
+        // Where the solution would be negative, it is 0 and the others make the best of it.
+        let x = least_squares(&matrix, &[1.0, 0.1, 1.0], 0.0);
+        assert!(x.iter().all(|x| *x >= 0.0) && x[1] == 0.0, "{x:?}");
+    }
+}

@@ -1,15 +1,18 @@
 //! Procedural textures by example (Lagae, Vangorp, Lenaerts and Dutré, "Procedural Textures by Example",
 //! 2009): a photo's statistics as a small document, from which noise like it is evaluated anywhere.
 //!
-//! [`fit`] analyses, [`Document`] is what remains, [`Evaluator`] gives values at points, [`raster`]
+//! [`fit`] and [`oriented`] analyse, [`Document`] is what remains, [`Evaluator`] gives values at points, [`raster`]
 //! pictures.
 
 pub mod document;
 pub mod evaluate;
 pub mod fit;
+pub mod oriented;
+mod ranks;
 pub mod raster;
+pub mod score;
 mod shape;
 
-pub use document::{Band, BandPart, BandShape, Channel, Document, MapSpec, Model, Score};
+pub use document::{Band, BandShape, Channel, Document, MapSpec, Model, Score};
 pub use evaluate::{Evaluator, Filter};
 pub use shape::{KNOTS, Shape};

@@ -2,6 +2,8 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
+use serde::{Deserialize, Serialize};
+
 use super::filters::{DOWN, UP};
 
 /// Which frequencies the coefficients of a band hold.
@@ -20,7 +22,8 @@ pub enum Detail {
 }
 
 /// Which frequencies along one axis.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Part {
     /// All up to the upper end.
     Low,
@@ -60,18 +63,18 @@ fn fall(f: f64) -> f64 {
 }
 
 /// What the quadratic B-spline leaves of a frequency.
-fn spline_transfer(f: f64) -> f64 {
+pub(super) fn spline_transfer(f: f64) -> f64 {
     if f == 0.0 { 1.0 } else { (libm::sin(PI * f) / (PI * f)).powi(3) }
 }
 
 /// What it leaves of it at the coefficients themselves.
-fn knot_transfer(f: f64) -> f64 {
+pub(super) fn knot_transfer(f: f64) -> f64 {
     0.75 + 0.25 * libm::cos(TAU * f)
 }
 
 impl Part {
     /// Amplitude at frequency `f` (cycles a coefficient), so that the spline surface is even.
-    fn amplitude(self, f: f64) -> f64 {
+    pub(super) fn amplitude(self, f: f64) -> f64 {
         match self {
             Self::Low => fall(f) / spline_transfer(f),
             Self::Band => rise(f) * fall(f) / spline_transfer(f),

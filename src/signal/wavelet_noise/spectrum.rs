@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 
 use rayon::prelude::*;
 
-use super::detail::Frequency;
-use super::{Detail, spline};
+use super::detail::{Frequency, knot_transfer, spline_transfer};
+use super::{Detail, Part, spline};
 use crate::signal::power::window;
 
 /// Power to expect at the frequencies of the Fourier transform of `(rows, cols)` pixels of noise with
@@ -129,6 +129,47 @@ pub fn at_pixels(detail: Detail, levels: [u32; 2]) -> f64 {
     sum_both_signs(&power, (N << levels[1], N << levels[0]), |_, _| true)
 }
 
+/// The octave of a frequency in cycles a pixel: 0 from a quarter on, 1 from an eighth on; the last of
+/// `levels` has all below.
+pub fn octave(f: f64, levels: usize) -> usize {
+    let mut lower = 0.25;
+    let mut octave = 0;
+    while f < lower && octave + 1 < levels {
+        (lower, octave) = (lower / 2.0, octave + 1);
+    }
+    octave
+}
+
+/// Power to expect, along one axis of `n` pixels, of noise with unit variance whose coefficients are
+/// `2^level` pixels apart, in each of `levels` octaves, as seen through the window. `turned` is noise
+/// whose axes are not the pixels'.
+pub fn along_axis(part: Part, level: u32, levels: usize, turned: bool, n: usize) -> Vec<f64> {
+    let spacing = f64::from(1u32 << level);
+    let power = |k: usize| {
+        let here = k as f64 / n as f64 * spacing;
+        let transfer =
+            if level == 0 && !turned { knot_transfer(here) } else { spline_transfer(here) };
+        (part.amplitude((here - here.round()).abs()) * transfer).powi(2) * spacing / n as f64
+    };
+    let mut line: Vec<f64> = (0..=n / 2).map(power).collect();
+    Axis { transfer: Vec::new(), n, moved: moved(n) }.blur(&mut line);
+    let mut sums = vec![0.0; levels];
+    for (k, power) in line.iter().enumerate() {
+        sums[octave(k as f64 / n as f64, levels)] += power * signs(k, n);
+    }
+    let variance = continuous_axis(part);
+    sums.iter().map(|sum| sum / variance).collect()
+}
+
+/// Variance over all positions of the spline over coefficients of this part on a line.
+fn continuous_axis(part: Part) -> f64 {
+    const N: usize = 4096;
+    let products =
+        |f: f64| (66.0 + 52.0 * libm::cos(TAU * f) + 2.0 * libm::cos(2.0 * TAU * f)) / 120.0;
+    let at = |i: usize| (i as f64 + 0.5) / N as f64 - 0.5;
+    (0..N).map(|i| part.amplitude(at(i).abs()).powi(2) * products(at(i))).sum::<f64>() / N as f64
+}
+
 /// How many frequencies of a transform of `n` samples the `k`th stands for: its negative one too.
 pub fn signs(k: usize, n: usize) -> f64 {
     if k == 0 || 2 * k == n { 1.0 } else { 2.0 }
@@ -155,7 +196,7 @@ fn sum_both_signs(
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Part, Torus};
+    use super::super::Torus;
     use super::*;
     use crate::signal::power::power_spectrum;
 

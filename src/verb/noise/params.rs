@@ -32,10 +32,24 @@ choice! {
     }
 }
 
+choice! {
+    /// Which noise is fitted.
+    pub enum Directions {
+        /// What the score recommends.
+        Auto = "auto",
+        /// Noise that is alike in all directions.
+        Isotropic = "isotropic",
+        /// Noise with bands that differ along two directions.
+        Oriented = "oriented",
+    }
+}
+
 params! {
     /// Parameters of [`fit_noise`](crate::fit_noise).
     pub struct NoiseParams for "noise fit" {
-        /// The shape of the bands in the spectrum: round is alike in all directions; square is the paper's, Cook and DeRose's wavelet noise, and looks a little woven.
+        /// Which noise is fitted: isotropic is alike in all directions (the paper's kind); oriented has bands that differ along two directions, for wood and the like; auto takes what suits the photo.
+        directions: Directions = Directions::Auto;
+        /// The shape of isotropic noise's bands in the spectrum: round is alike in all directions; square is the paper's, Cook and DeRose's wavelet noise, and looks a little woven.
         bands: Bands = Bands::Round;
         /// How the bands' weights follow from the photo's spectrum: corrected takes into account what each band leaks into others; direct is the paper's formula, which does not.
         weights: Weights = Weights::Corrected;

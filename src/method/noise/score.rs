@@ -1,0 +1,187 @@
+//! [`Structure`]: what of a photo noise cannot hold.
+//!
+//! Noise has the photo's histogram and its power at every frequency. What it lacks is all that lies in the
+//! phases: edges, stones, blades of grass. Where there are such, octaves of the photo have rare strong
+//! values, and places of much detail beside places of little; noise has neither.
+
+use rayon::prelude::*;
+
+/// What noise cannot hold of a photo's strongest channel. Each is about 0 for noise.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Structure {
+    /// Excess kurtosis of the octaves: mean over them, weighted by their power.
+    pub kurtosis: f64,
+    /// By how much local power varies over each octave, as a share of its mean, more than noise's does:
+    /// mean as before.
+    pub patchiness: f64,
+    /// Share of each octave's power that lies in other directions than if all were alike: mean as before.
+    pub anisotropy: f64,
+}
+
+/// How much local power varies over octaves of noise, and how unlike directions are: by chance.
+const OF_NOISE: (f64, f64) = (0.25, 0.05);
+
+/// Kurtosis of one octave counts up to here: a single spark is not the whole picture.
+const MOST_KURTOSIS: f64 = 5.0;
+
+/// Side of the middle of a large photo that is looked at.
+const SIDE: usize = 1024;
+
+/// Directions that are told apart.
+const DIRECTIONS: usize = 8;
+
+impl Structure {
+    /// Nothing that noise lacks.
+    pub const NONE: Self = Self { kurtosis: 0.0, patchiness: 0.0, anisotropy: 0.0 };
+
+    /// Of a plane whose histogram was made normal, and its spectrum.
+    pub(super) fn of(plane: &[f32], shape: (usize, usize), power: &[f64]) -> Self {
+        let (kurtosis, patchiness) = of_octaves(plane, shape);
+        Self { kurtosis, patchiness, anisotropy: anisotropy(power, shape) }
+    }
+
+    /// How well isotropic noise fits, in 0..=1. The scale is chosen by eye: from 0.5 on the noise can be
+    /// taken for the photo at a glance.
+    pub fn isotropic_fit(&self) -> f64 {
+        libm::exp(-self.kurtosis - 2.0 * self.patchiness - 3.0 * self.anisotropy)
+    }
+
+    /// The same of noise with directions, which is patchy itself: its grain is long.
+    pub fn oriented_fit(&self) -> f64 {
+        let patchiness = (self.patchiness - 0.4 * self.anisotropy).max(0.0);
+        libm::exp(-self.kurtosis - 2.0 * patchiness - 0.5 * self.anisotropy)
+    }
+}
+
+/// Kurtosis and patchiness.
+fn of_octaves(plane: &[f32], (rows, cols): (usize, usize)) -> (f64, f64) {
+    let (height, width) = (rows.min(SIDE), cols.min(SIDE));
+    let (top, left) = ((rows - height) / 2, (cols - width) / 2);
+    let mut smooth: Vec<f32> =
+        (top..top + height).flat_map(|y| &plane[y * cols + left..][..width]).copied().collect();
+    // Of the coarsest some dozen waves fit in.
+    let octaves = height.min(width).ilog2().saturating_sub(4).max(1);
+    let (mut powers, mut kurtoses, mut patches) = (0.0, 0.0, 0.0);
+    for octave in 0..octaves {
+        let step = 1usize << octave;
+        let smoother = blurred(&smooth, (height, width), step);
+        let squares: Vec<f32> =
+            smooth.iter().zip(&smoother).map(|(a, b)| (a - b) * (a - b)).collect();
+        let around = blurred(&squares, (height, width), step);
+        let around = blurred(&around, (height, width), 2 * step);
+        // Without the border, which is mirrored.
+        let border = (2 * step).min(height.min(width) / 4);
+        let inner = |values: &[f32], power: i32| {
+            let lines = (border..height - border).map(|y| {
+                let line = &values[y * width + border..(y + 1) * width - border];
+                line.iter().map(|&v| f64::from(v).powi(power)).sum::<f64>()
+            });
+            lines.sum::<f64>() / ((height - 2 * border) * (width - 2 * border)) as f64
+        };
+        let power = inner(&squares, 1);
+        let mean = inner(&around, 1);
+        if power > 0.0 && mean > 0.0 {
+            let kurtosis = inner(&squares, 2) / (power * power) - 3.0;
+            let varies = (inner(&around, 2) / (mean * mean) - 1.0).max(0.0).sqrt();
+            powers += power;
+            kurtoses += power * kurtosis.clamp(0.0, MOST_KURTOSIS);
+            patches += power * (varies - OF_NOISE.0).max(0.0);
+        }
+        smooth = smoother;
+    }
+    if powers > 0.0 { (kurtoses / powers, patches / powers) } else { (0.0, 0.0) }
+}
+
+/// A plane blurred by the cubic B-spline's taps, `step` samples apart, along both axes.
+fn blurred(plane: &[f32], (height, width): (usize, usize), step: usize) -> Vec<f32> {
+    const TAPS: [f32; 5] = [0.0625, 0.25, 0.375, 0.25, 0.0625];
+    let mirrored = |i: usize, k: usize, n: usize| {
+        let at = (i + k * step) as i64 - 2 * step as i64;
+        let at = if at < 0 { -at } else { at } as usize;
+        if at >= n { (2 * n - 2).saturating_sub(at).min(n - 1) } else { at }
+    };
+    let mut across = vec![0.0; plane.len()];
+    across.par_chunks_mut(width).zip(plane.par_chunks(width)).for_each(|(to, from)| {
+        for (x, to) in to.iter_mut().enumerate() {
+            *to = TAPS.iter().enumerate().map(|(k, t)| t * from[mirrored(x, k, width)]).sum();
+        }
+    });
+    let mut out = vec![0.0; plane.len()];
+    out.par_chunks_mut(width).enumerate().for_each(|(y, to)| {
+        for (k, tap) in TAPS.into_iter().enumerate() {
+            let from = &across[mirrored(y, k, height) * width..][..width];
+            to.iter_mut().zip(from).for_each(|(to, v)| *to += tap * v);
+        }
+    });
+    out
+}
+
+/// How unlike the directions of each octave are.
+fn anisotropy(power: &[f64], (rows, cols): (usize, usize)) -> f64 {
+    // Below, too few waves fit in to tell.
+    let octaves = rows.min(cols).ilog2().saturating_sub(3).max(1) as usize;
+    let mut sums = vec![[0.0; DIRECTIONS]; octaves];
+    let mut counts = vec![[0u32; DIRECTIONS]; octaves];
+    let signed = |k: usize, n: usize| {
+        if 2 * k > n { k as f64 / n as f64 - 1.0 } else { k as f64 / n as f64 }
+    };
+    for (i, power) in power.iter().enumerate() {
+        let (fx, fy) = (signed(i % cols, cols), signed(i / cols, rows));
+        let octave = (-libm::log2((fx * fx + fy * fy).sqrt()) - 1.0).floor();
+        if octave >= 0.0 && octave < octaves as f64 {
+            let turns = libm::atan2(fy, fx) / std::f64::consts::PI + 2.0;
+            let sector = (turns * DIRECTIONS as f64 + 0.5) as usize % DIRECTIONS;
+            sums[octave as usize][sector] += power;
+            counts[octave as usize][sector] += 1;
+        }
+    }
+    let (mut powers, mut unlike) = (0.0, 0.0);
+    for (sums, counts) in sums.iter().zip(&counts) {
+        let means: Vec<f64> =
+            sums.iter().zip(counts).map(|(s, c)| s / f64::from((*c).max(1))).collect();
+        let (power, total) = (sums.iter().sum::<f64>(), means.iter().sum::<f64>());
+        if total > 0.0 {
+            let even = 1.0 / DIRECTIONS as f64;
+            let off = means.iter().map(|m| (m / total - even).abs()).sum::<f64>() / 2.0;
+            powers += power;
+            unlike += power * (off - OF_NOISE.1).max(0.0);
+        }
+    }
+    if powers > 0.0 { unlike / powers } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::signal::power::power_spectrum;
+    use crate::signal::wavelet_noise::{Detail, Part, Torus};
+
+    fn structure(plane: &[f32], shape: (usize, usize)) -> Structure {
+        Structure::of(plane, shape, &power_spectrum(plane, shape))
+    }
+
+    #[test]
+    fn noise_has_none_and_spots_have() {
+        let n = 256;
+        let torus = Torus::new((n, n), Detail::Round);
+        let at = |i: usize| (i % n) as f64 / 2.0;
+        let noise: Vec<f32> = (0..n * n).map(|i| torus.at(at(i), (i / n) as f64 / 2.0)).collect();
+        let of_noise = structure(&noise, (n, n));
+        assert!(of_noise.isotropic_fit() > 0.6, "{of_noise:?}");
+        // The same noise, where it is strong.
+        let spots: Vec<f32> = noise.iter().map(|v| (v - 1.5).max(0.0)).collect();
+        let of_spots = structure(&spots, (n, n));
+        assert!(of_spots.isotropic_fit() < 0.2, "{of_spots:?}");
+    }
+
+    #[test]
+    fn grain_has_directions() {
+        let n = 256;
+        let torus = Torus::new((n, n), Detail::Axes([Part::Band, Part::Low]));
+        let grain: Vec<f32> =
+            (0..n * n).map(|i| torus.at((i % n) as f64 / 2.0, (i / n) as f64 / 16.0)).collect();
+        let structure = structure(&grain, (n, n));
+        assert!(structure.anisotropy > 0.4, "{structure:?}");
+        assert!(structure.oriented_fit() > 2.0 * structure.isotropic_fit(), "{structure:?}");
+    }
+}
