@@ -2,6 +2,8 @@
 //!
 //! [`Program`] lists what every target needs; each target is one file that turns it into text.
 
+mod materialx;
+mod nodes;
 mod program;
 
 pub use program::{Program, ProgramChannel, ProgramTerm};
@@ -13,4 +15,16 @@ pub struct ExportFile {
     pub name: String,
     /// Its contents.
     pub bytes: Vec<u8>,
+}
+
+/// Temporary.
+///
+/// # Errors
+/// None.
+pub fn nodes_export(evaluator: &crate::method::noise::Evaluator, target: &str, name: &str) -> crate::Result<Vec<ExportFile>> {
+    let program = Program::new(evaluator);
+    match target {
+        "materialx" => materialx::materialx(&program, name),
+        _ => Ok(vec![]),
+    }
 }

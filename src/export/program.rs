@@ -1,5 +1,7 @@
 //! [`Program`]: a procedural texture as the numbers that a shader computes with.
 
+use crate::base::params::Value as _;
+use crate::image::material::MapKind;
 use crate::method::noise::{Evaluator, Filter};
 use crate::signal::wavelet_noise::Torus;
 
@@ -35,6 +37,8 @@ pub struct Program {
     pub matrix: Vec<Vec<f32>>,
     /// Name, encoding (`srgb`, `linear`, `data`) and number of outputs of each map, in order.
     pub maps: Vec<(String, String, usize)>,
+    /// What the numbers of each map are.
+    pub kinds: Vec<MapKind>,
     /// Width and height of the photo in pixels.
     pub size: [u32; 2],
 }
@@ -108,6 +112,11 @@ impl Program {
                 .maps
                 .iter()
                 .map(|map| (map.name.clone(), map.encoding.clone(), map.channels))
+                .collect(),
+            kinds: document
+                .maps
+                .iter()
+                .map(|map| MapKind::parse(&map.kind).unwrap_or(MapKind::Data))
                 .collect(),
             size: document.size,
         }
