@@ -195,8 +195,9 @@ impl Graph {
             if nodes.groups.iter().all(|g| g.weights[t] == [0.0; TOGETHER]) {
                 continue;
             }
-            let scale = In::Numbers(&nodes.scales[t]);
-            let band = self.two("multiply", &format!("band{t}"), &pixels, scale);
+            // Not multiplied: MaterialX writes six decimals into shaders.
+            let span = In::Numbers(&nodes.spans[t]);
+            let band = self.two("divide", &format!("band{t}"), &pixels, span);
             for (group, sum) in nodes.groups.iter().zip(&mut sums) {
                 if group.weights[t] == [0.0; TOGETHER] {
                     continue;

@@ -19,8 +19,8 @@ pub(super) const TOGETHER: usize = 3;
 pub(super) struct Nodes {
     /// What turns positions in pixels, v up: the rows of a matrix.
     pub(super) turn: Option<[[f64; 2]; 2]>,
-    /// Of each term, by what a position in pixels is multiplied to be a place in the tile's picture.
-    pub(super) scales: Vec<[f64; 2]>,
+    /// Of each term, by what a position in pixels is divided to be a place in the tile's picture.
+    pub(super) spans: Vec<[f64; 2]>,
     /// The channels by [`TOGETHER`].
     pub(super) groups: Vec<Group>,
     /// By how many coefficients (x, y) green and blue are before red in the pictures.
@@ -56,30 +56,30 @@ impl Nodes {
     /// first coefficient.
     pub(super) fn new(program: &Program, fine: usize) -> Self {
         let side = Torus::SIDE as f64;
-        let scales: Vec<[f64; 2]> = program
+        let spans: Vec<[f64; 2]> = program
             .terms
             .iter()
-            .map(|term| term.levels.map(|level| 1.0 / (side * f64::from(1u32 << level))))
+            .map(|term| term.levels.map(|level| side * f64::from(1u32 << level)))
             .collect();
         let height = f64::from(program.size[1]);
         let [c, s] = program.turn.unwrap_or([1.0, 0.0]);
         // The photo's y is height - v; half a sample, as pictures begin at its edge.
         let half = 0.5 / (side * fine as f64);
-        let offset = |[x, y]: [u32; 2], [sx, sy]: [f64; 2]| {
-            let x = (s * height - 0.5 + f64::from(x)) * sx + half;
-            let y = (c * height - 0.5 + f64::from(y)) * sy + half;
+        let offset = |[x, y]: [u32; 2], [span_x, span_y]: [f64; 2]| {
+            let x = (s * height - 0.5 + f64::from(x)) / span_x + half;
+            let y = (c * height - 0.5 + f64::from(y)) / span_y + half;
             [x.rem_euclid(1.0), (-y).rem_euclid(1.0)]
         };
         let group = |channels: &[ProgramChannel]| Group {
-            offsets: channels[0].offsets.iter().zip(&scales).map(|(&o, &s)| offset(o, s)).collect(),
-            weights: (0..scales.len()).map(|t| each(channels, |c| weight(c, t))).collect(),
+            offsets: channels[0].offsets.iter().zip(&spans).map(|(&o, &s)| offset(o, s)).collect(),
+            weights: (0..spans.len()).map(|t| each(channels, |c| weight(c, t))).collect(),
             shape: GroupShape::new(channels),
         };
         Self {
             turn: program.turn.map(|[c, s]| [[c, -s], [s, c]]),
             groups: program.channels.chunks(TOGETHER).map(group).collect(),
             shifts: std::array::from_fn(|k| shift(program, k)),
-            scales,
+            spans,
         }
     }
 }
