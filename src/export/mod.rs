@@ -2,6 +2,7 @@
 //!
 //! [`Program`] lists what every target needs; each target is one file that turns it into text.
 
+mod blender;
 mod materialx;
 mod nodes;
 mod program;
@@ -25,6 +26,6 @@ pub fn nodes_export(evaluator: &crate::method::noise::Evaluator, target: &str, n
     let program = Program::new(evaluator);
     match target {
         "materialx" => materialx::materialx(&program, name),
-        _ => Ok(vec![]),
+        _ => Ok(blender::blender(&program, name)),
     }
 }
