@@ -8,7 +8,6 @@ import numpy as np
 
 FINE = 3  # samples to a coefficient in the pictures
 SIDE = 256  # coefficients along the side of a tile
-ABOVE = 8  # is added to the noise in pictures: Eevee takes what is below 0 for 0
 
 
 class Graph:
@@ -84,7 +83,7 @@ def picture(name, tile, shifts):
     surface = drawn(drawn(coefficients).T).T
     pixels = np.ones((SIDE * FINE, SIDE * FINE, 4), np.float32)
     for k, (x, y) in enumerate(shifts):
-        pixels[..., k] = ABOVE + np.roll(surface, (-y * FINE, -x * FINE), axis=(0, 1))[::-1]
+        pixels[..., k] = np.roll(surface, (-y * FINE, -x * FINE), axis=(0, 1))[::-1]
     old = bpy.data.images.get(name)
     if old is not None:
         bpy.data.images.remove(old)
@@ -142,7 +141,7 @@ def histogram(graph, noise, shape):
 
 def noise_of(graph, group, place, bands, images):
     """Return the sum of a group's bands."""
-    total = [-ABOVE * sum(column) for column in zip(*group["weights"])]
+    total = (0, 0, 0)
     for band, weights, offset in zip(bands, group["weights"], group["offsets"]):
         if not any(weights):
             continue

@@ -7,7 +7,30 @@ mod materialx;
 mod nodes;
 mod program;
 
+use crate::base::error::Result;
+use crate::base::params::choice;
+
 pub use program::{Program, ProgramChannel, ProgramTerm};
+
+choice! {
+    /// A language or a program that a texture is written for.
+    pub enum Target {
+        /// GLSL 3.30 and later, for desktop OpenGL and Vulkan.
+        Glsl = "glsl",
+        /// GLSL ES 3.00: WebGL 2, Three.js, Godot.
+        GlslEs = "glsl-es",
+        /// WGSL: WebGPU, Bevy.
+        Wgsl = "wgsl",
+        /// HLSL, shader model 4 and later: Unity, Unreal.
+        Hlsl = "hlsl",
+        /// Open Shading Language: Blender's Cycles and other renderers.
+        Osl = "osl",
+        /// MaterialX: Houdini, Maya, Unreal, USD.
+        Materialx = "materialx",
+        /// A Python script that builds a node group in Blender, for Eevee and Cycles.
+        Blender = "blender",
+    }
+}
 
 /// One file of an export.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -18,14 +41,17 @@ pub struct ExportFile {
     pub bytes: Vec<u8>,
 }
 
-/// Temporary.
+/// The files of a texture for a target. `texture_name` names them and the functions in them, with `_`
+/// for what cannot stand in a name.
+///
+/// The same program gives the same bytes.
 ///
 /// # Errors
-/// None.
-pub fn nodes_export(evaluator: &crate::method::noise::Evaluator, target: &str, name: &str) -> crate::Result<Vec<ExportFile>> {
-    let program = Program::new(evaluator);
+/// [`Error::Format`](crate::Error::Format) if a picture cannot be written, which would be a bug.
+pub fn export(texture_name: &str, program: &Program, target: Target) -> Result<Vec<ExportFile>> {
     match target {
-        "materialx" => materialx::materialx(&program, name),
-        _ => Ok(blender::blender(&program, name)),
+        Target::Materialx => materialx::materialx(program, texture_name),
+        Target::Blender => Ok(blender::blender(program, texture_name)),
+        _ => Ok(Vec::new()),
     }
 }

@@ -155,6 +155,8 @@ def _settings(scene: Any, size: tuple[int, int], engine: Engine, *, osl: bool) -
     render.image_settings.color_depth = "32"
     render.image_settings.exr_codec = "ZIP"
     scene.eevee.taa_render_samples = 1
+    # On the processor it blurs what is magnified.
+    bpy.context.preferences.system.anisotropic_filter = "FILTER_0"
     cycles = scene.cycles
     cycles.device = "CPU"
     cycles.shading_system = osl
