@@ -1,7 +1,7 @@
 """The compiled module. Private: `_api.py` is its only caller."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, final
 
 _Picture = tuple[Any, str, tuple[int, int, int], str]
 _PictureOut = tuple[bytearray, str, tuple[int, int, int], str]
@@ -20,6 +20,7 @@ _Extracted = tuple[
 _TileOut = tuple[_PictureOut, _MapOut | None, list[tuple[str, _PictureOut]], str, list[_Step]]
 
 __all__ = [
+    "Noise",
     "__version__",
     "apply",
     "cli_main",
@@ -28,6 +29,7 @@ __all__ = [
     "error_kinds",
     "extract",
     "fail",
+    "fit_noise",
     "lattice",
     "lattice_overlay",
     "lattice_snap",
@@ -39,11 +41,63 @@ __all__ = [
     "texture_cost",
     "tiles",
     "write",
+    "write_files",
     "write_source_map",
 ]
 
 __version__: str
 
+@final
+class Noise:
+    @staticmethod
+    def from_json(text: str) -> Noise: ...
+    @staticmethod
+    def load(path: str) -> Noise: ...
+    def to_json(self) -> str: ...
+    def at(
+        self,
+        *,
+        points: Any,
+        count: int,
+        axes: int,
+        normals: Any,
+        footprint: float,
+        keep_contrast: bool,
+        threads: int,
+    ) -> bytearray: ...
+    def volume(
+        self,
+        *,
+        shape: list[int],
+        scale: float,
+        origin: list[float],
+        keep_contrast: bool,
+        threads: int,
+        progress: Callable[[float], object] | None,
+    ) -> bytearray: ...
+    def render(
+        self,
+        *,
+        size: _Size,
+        scale: float,
+        origin: list[float],
+        tileable: bool,
+        keep_contrast: bool,
+        dtype: str,
+        only: str | None,
+        threads: int,
+        progress: Callable[[float], object] | None,
+    ) -> list[tuple[str, _PictureOut]]: ...
+
+def fit_noise(
+    *,
+    maps: list[tuple[str, _Picture, str]],
+    mask: _Picture | None,
+    params: list[tuple[str, str]],
+    seed: int,
+    threads: int,
+    progress: Callable[[float], object] | None,
+) -> tuple[Noise, str]: ...
 def tiles(
     *,
     photo: _Picture,
@@ -109,6 +163,7 @@ def read(*, path: str, kind: str) -> _PictureOut: ...
 def write(
     *, path: str, picture: _Picture, kind: str, record: str | None, overwrite: bool
 ) -> None: ...
+def write_files(*, files: list[tuple[str, bytes]], overwrite: bool) -> None: ...
 def encode_png(*, picture: _Picture) -> bytes: ...
 def read_source_map(*, path: str) -> _MapOut: ...
 def write_source_map(*, path: str, source_map: _Map, overwrite: bool) -> None: ...

@@ -36,33 +36,42 @@ pub fn power_spectrum(plane: &[f32], (height, width): (usize, usize)) -> Vec<f64
         wy * row.iter().zip(&along).map(|(&v, wx)| f64::from(v) * wx).sum::<f64>()
     };
     let mean = rows.map(row).sum::<f64>() / (total(&down) * total(&along));
-    let mut planner = FftPlanner::<f64>::new();
-    let (of_rows, of_columns) = (planner.plan_fft_forward(width), planner.plan_fft_forward(height));
-    let mut rows = vec![Complex::default(); plane.len()];
-    let lines = rows.par_chunks_mut(width).zip(plane.par_chunks(width)).zip(&down);
-    lines.for_each_init(
-        || vec![Complex::default(); of_rows.get_inplace_scratch_len()],
-        |scratch, ((to, from), wy)| {
-            for ((to, &v), wx) in to.iter_mut().zip(from).zip(&along) {
-                to.re = (f64::from(v) - mean) * wx * wy;
-            }
-            of_rows.process_with_scratch(to, scratch);
-        },
-    );
-    let mut columns = transposed(&rows, width);
-    drop(rows);
+    let weighted = |i: usize| {
+        let (y, x) = (i / width, i % width);
+        Complex::new((f64::from(plane[i]) - mean) * (along[x] * down[y]), 0.0)
+    };
+    let spectrum =
+        transform((0..plane.len()).into_par_iter().map(weighted).collect(), (height, width));
     let square = |weights: &[f64]| weights.iter().map(|w| w * w).sum::<f64>();
     let scale = 1.0 / (square(&down) * square(&along) * plane.len() as f64);
-    let mut power = vec![0.0; plane.len()];
-    columns.par_chunks_mut(height).zip(power.par_chunks_mut(height)).for_each_init(
-        || vec![Complex::default(); of_columns.get_inplace_scratch_len()],
-        |scratch, (column, power)| {
-            of_columns.process_with_scratch(column, scratch);
-            power.iter_mut().zip(column).for_each(|(power, v)| *power = v.norm_sqr() * scale);
-        },
-    );
+    let mut power: Vec<f64> = spectrum.par_iter().map(|v| v.norm_sqr() * scale).collect();
     power[0] = 0.0;
-    transposed(&power, height)
+    power
+}
+
+/// The transform of real samples that are the same at opposite places (of a plane that goes round): real
+/// again. So the correlation at every displacement follows from a spectrum of powers, and the other way
+/// round, but for a factor of the number of samples.
+pub fn transform_even(samples: &[f64], shape: (usize, usize)) -> Vec<f64> {
+    let values = samples.par_iter().map(|&v| Complex::new(v, 0.0)).collect();
+    transform(values, shape).par_iter().map(|v| v.re).collect()
+}
+
+/// The discrete Fourier transform, unscaled.
+fn transform(mut rows: Vec<Complex<f64>>, (height, width): (usize, usize)) -> Vec<Complex<f64>> {
+    let mut planner = FftPlanner::<f64>::new();
+    let mut along = |lines: &mut [Complex<f64>], n: usize| {
+        let plan = planner.plan_fft_forward(n);
+        lines.par_chunks_mut(n).for_each_init(
+            || vec![Complex::default(); plan.get_inplace_scratch_len()],
+            |scratch, line| plan.process_with_scratch(line, scratch),
+        );
+    };
+    along(&mut rows, width);
+    let mut columns = transposed(&rows, width);
+    drop(rows);
+    along(&mut columns, height);
+    transposed(&columns, height)
 }
 
 /// A plane with lines of `length` turned into its columns.
@@ -108,6 +117,19 @@ mod tests {
                 .sum();
             let expected = sum.norm_sqr() / (square * (h * w) as f64);
             assert!((got - expected).abs() < 1e-9, "{i}: {got} for {expected}");
+        }
+    }
+
+    #[test]
+    fn a_spectrum_and_its_correlation_are_transforms_of_each_other() {
+        let (h, w) = (6, 9);
+        let plane: Vec<f32> = (0..h * w).map(|i| ((i * 37) % 17) as f32).collect();
+        let power = power_spectrum(&plane, (h, w));
+        let correlation = transform_even(&power, (h, w));
+        // The variance at no displacement.
+        assert!((correlation[0] - power.iter().sum::<f64>()).abs() < 1e-9);
+        for (a, b) in power.iter().zip(transform_even(&correlation, (h, w))) {
+            assert!((a - b / (h * w) as f64).abs() < 1e-9);
         }
     }
 

@@ -189,7 +189,8 @@ impl Document {
     }
 
     /// With all numbers rounded to six digits, as they are written.
-    pub(super) fn rounded(mut self) -> Self {
+    #[must_use]
+    pub fn rounded(mut self) -> Self {
         let round = |values: &mut Vec<f64>| values.iter_mut().for_each(|v| *v = six_digits(*v));
         round(&mut self.mean);
         self.matrix.iter_mut().for_each(round);

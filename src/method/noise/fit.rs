@@ -7,9 +7,8 @@ use crate::base::error::{Error, Result};
 use crate::method::noise::document::{BandShape, Channel, MOST_LEVEL, Term};
 use crate::method::noise::shape::{KNOTS, Shape};
 use crate::signal::normal;
-use crate::signal::power::power_spectrum;
+use crate::signal::power::{power_spectrum, transform_even};
 use crate::signal::symmetric::eigen;
-use crate::signal::wavelet_noise::LOWER_END;
 use crate::signal::wavelet_noise::spectrum::{expected, signs};
 
 /// Steps of progress that [`fit`] counts, but for one for each channel.
@@ -51,6 +50,13 @@ pub struct Exemplar<'a> {
     pub usable: Option<&'a [bool]>,
 }
 
+impl Exemplar<'_> {
+    /// Whether sample `i` is usable.
+    fn counts(&self, i: usize) -> bool {
+        self.usable.is_none_or(|usable| usable[i])
+    }
+}
+
 /// Number of bands that a photo of this shape tells something about: of the coarsest, at least one wave
 /// fits in.
 pub fn levels((rows, cols): (usize, usize)) -> u32 {
@@ -80,10 +86,7 @@ pub fn fit(ctx: &Ctx, exemplar: &Exemplar, options: Options) -> Result<Fit> {
         });
     }
     let chosen: Vec<_> = axes.iter().filter(|(v, _)| *v > LEAST_SHARE * total).collect();
-    let levels = levels(exemplar.shape);
-    // The paper's formula divides the spectrum as the paper does.
-    let divided = if options.direct { BandShape::Square } else { options.shape };
-    let bands = Bands::new(exemplar.shape, Division { shape: divided, levels }, options.shape);
+    let bands = Bands::new(exemplar.shape, options.shape);
     ctx.step(1)?;
     let channel = |(_, axis): &&(f64, Vec<f64>)| {
         let plane = along(exemplar, &mean, axis);
@@ -104,7 +107,7 @@ fn sum(exemplar: &Exemplar, value: impl Fn(usize) -> f64 + Sync) -> f64 {
         .into_par_iter()
         .map(|y| {
             let row = y * cols..(y + 1) * cols;
-            row.filter(|&i| exemplar.usable.is_none_or(|u| u[i])).map(&value).sum()
+            row.filter(|&i| exemplar.counts(i)).map(&value).sum()
         })
         .collect();
     rows.iter().sum()
@@ -137,7 +140,7 @@ fn along(exemplar: &Exemplar, mean: &[f64], axis: &[f64]) -> Vec<f32> {
     out.par_chunks_mut(cols).enumerate().for_each(|(y, line)| {
         for (x, out) in line.iter_mut().enumerate() {
             let i = y * cols + x;
-            if exemplar.usable.is_none_or(|u| u[i]) {
+            if exemplar.counts(i) {
                 let parts = exemplar.planes.iter().zip(mean).zip(axis);
                 *out = parts.map(|((p, m), a)| (f64::from(p[i]) - m) * a).sum::<f64>() as f32;
             }
@@ -149,39 +152,26 @@ fn along(exemplar: &Exemplar, mean: &[f64], axis: &[f64]) -> Vec<f32> {
 /// The bands of a photo: what each sees of noise, and where it lies in the spectrum.
 struct Bands {
     shape: (usize, usize),
-    division: Division,
     /// Power that band b (row) sees of noise with unit weight in level j (column).
     leakage: Vec<Vec<f64>>,
 }
 
-/// How a spectrum is divided into octaves.
-#[derive(Clone, Copy)]
-struct Division {
-    shape: BandShape,
-    levels: u32,
-}
-
-impl Division {
-    /// The octave of a frequency in cycles a pixel: the finest also has all above, the coarsest all below.
-    fn band(self, fx: f64, fy: f64) -> usize {
-        // Where the noise's own bands have half their power; or the paper's, equation 10.
-        let (f, end) = match self.shape {
-            BandShape::Round => ((fx * fx + fy * fy).sqrt(), LOWER_END),
-            BandShape::Square => (fx.max(fy), 0.25),
-        };
-        let mut lower = end;
-        let mut band = 0;
-        while f < lower && band + 1 < self.levels {
-            (lower, band) = (lower / 2.0, band + 1);
-        }
-        band as usize
+/// The octave of a frequency in cycles a pixel (the paper's equation 10): of `levels`, the finest also has
+/// all above, the coarsest all below.
+fn octave(fx: f64, fy: f64, levels: usize) -> usize {
+    let f = fx.max(fy);
+    let mut lower = 0.25;
+    let mut octave = 0;
+    while f < lower && octave + 1 < levels {
+        (lower, octave) = (lower / 2.0, octave + 1);
     }
+    octave
 }
 
 impl Bands {
-    fn new(shape: (usize, usize), division: Division, noise: BandShape) -> Self {
+    fn new(shape: (usize, usize), noise: BandShape) -> Self {
         let (rows, cols) = shape;
-        let levels = division.levels as usize;
+        let levels = levels(shape) as usize;
         let of_level = |j: usize| {
             let Term { detail, levels: at } = noise.term(j as u32);
             let mut sums = vec![0.0; levels];
@@ -191,7 +181,7 @@ impl Bands {
                     // The mean is taken out.
                     if r + q > 0 {
                         let (fx, fy) = (q as f64 / cols as f64, r as f64 / rows as f64);
-                        sums[division.band(fx, fy)] += power * signs(q, cols) * signs(r, rows);
+                        sums[octave(fx, fy, levels)] += power * signs(q, cols) * signs(r, rows);
                     }
                 }
             }
@@ -199,31 +189,34 @@ impl Bands {
         };
         let columns: Vec<_> = (0..levels).into_par_iter().map(of_level).collect();
         let row = |b: usize| columns.iter().map(|column| column[b]).collect();
-        Self { shape, division, leakage: (0..levels).map(row).collect() }
+        Self { shape, leakage: (0..levels).map(row).collect() }
     }
 
-    /// The power of a plane in every band.
-    fn powers(&self, plane: &[f32]) -> Vec<f64> {
+    /// The power of a spectrum in every band.
+    fn powers(&self, power: &[f64]) -> Vec<f64> {
         let (rows, cols) = self.shape;
-        let power = power_spectrum(plane, self.shape);
+        let levels = self.leakage.len();
         // A row's share, then all rows in order.
         let lines: Vec<Vec<f64>> = power
             .par_chunks(cols)
             .enumerate()
             .map(|(r, line)| {
                 let fy = r.min(rows - r) as f64 / rows as f64;
-                let mut sums = vec![0.0; self.leakage.len()];
+                let mut sums = vec![0.0; levels];
                 for (q, power) in line.iter().enumerate() {
-                    sums[self.division.band(q.min(cols - q) as f64 / cols as f64, fy)] += power;
+                    let fx = q.min(cols - q) as f64 / cols as f64;
+                    sums[octave(fx, fy, levels)] += power;
                 }
                 sums
             })
             .collect();
-        (0..self.leakage.len()).map(|b| lines.iter().map(|l| l[b]).sum()).collect()
+        let sum = |b: usize| lines.iter().map(|l| l[b]).sum::<f64>();
+        // Of a spectrum that was computed powers may be a little below nothing.
+        (0..levels).map(|b| sum(b).max(0.0)).collect()
     }
 }
 
-/// Bands, histogram and weights of one independent channel.
+/// Histogram and weights of one independent channel.
 fn fit_channel(
     mut plane: Vec<f32>,
     exemplar: &Exemplar,
@@ -232,54 +225,111 @@ fn fit_channel(
 ) -> Channel {
     let usable = exemplar.usable.map_or(plane.len(), |u| u.iter().filter(|u| **u).count());
     let variance = sum(exemplar, |i| f64::from(plane[i]).powi(2)) / usable as f64;
-    let histogram = options.histogram.then(|| gaussianise(&mut plane, exemplar, variance));
+    let ranks = options.histogram.then(|| Ranks::new(&plane, exemplar, variance));
+    if let Some(ranks) = ranks.as_ref().filter(|_| options.direct) {
+        ranks.gaussianise(&mut plane, exemplar);
+    }
     // What is masked out is the mean, and has no power.
     let gain = plane.len() as f64 / usable as f64;
-    let powers: Vec<f64> = bands.powers(&plane).into_iter().map(|p| p * gain).collect();
+    let mut power = power_spectrum(&plane, exemplar.shape);
+    power.iter_mut().for_each(|p| *p *= gain);
+    if let Some(ranks) = ranks.as_ref().filter(|_| !options.direct) {
+        power = before_shape(&ranks.shape(), &power, exemplar.shape);
+    }
+    let powers = bands.powers(&power);
     let squares = if options.direct { powers } else { least_squares(&bands.leakage, &powers) };
-    Channel { weights: squares.into_iter().map(f64::sqrt).collect(), histogram }
+    let weights = squares.into_iter().map(f64::sqrt).collect();
+    Channel { weights, histogram: ranks.map(|ranks| ranks.knots.to_vec()) }
+}
+
+/// The spectrum that noise must have for its values to have the spectrum `power` once `shape` has brought
+/// them into the photo's histogram: shaping moves power between octaves.
+///
+/// If two normal numbers have correlation r, their shaped values have the correlation
+/// sum of `c_k`^2 r^k, where `c_k` are the shape's coefficients in normalised Hermite polynomials. That is
+/// inverted at every displacement.
+fn before_shape(shape: &Shape, power: &[f64], size: (usize, usize)) -> Vec<f64> {
+    const STEPS: usize = 2000;
+    let squares = shape.hermite_squares();
+    let total: f64 = squares.iter().sum();
+    let shaped = |r: f64| squares.iter().rev().fold(0.0, |sum, c| (sum + c / total) * r);
+    // Both are in -1..=1; where the shape cannot make so strong an opposite, -1.
+    let table: Vec<f64> =
+        (0..=STEPS).map(|i| shaped(2.0 * i as f64 / STEPS as f64 - 1.0)).collect();
+    let unshaped = |s: f64| {
+        let above = table.partition_point(|&t| t < s).clamp(1, STEPS);
+        let (low, high) = (table[above - 1], table[above]);
+        let part = if high > low { ((s - low) / (high - low)).clamp(0.0, 1.0) } else { 0.0 };
+        2.0 * ((above - 1) as f64 + part) / STEPS as f64 - 1.0
+    };
+    let mut correlation = transform_even(power, size);
+    let variance = correlation[0];
+    if variance <= 0.0 {
+        return power.to_vec();
+    }
+    correlation.par_iter_mut().for_each(|c| *c = unshaped(*c / variance));
+    let scale = variance / power.len() as f64;
+    transform_even(&correlation, size).iter().map(|p| p * scale).collect()
 }
 
 /// Levels of a plane's histogram.
 const STEPS_OF_VALUE: usize = 1 << 16;
 
-/// Replaces the samples by normally distributed ones of the same order and variance; returns the
-/// histogram's values at the knots, with exactly the samples' mean (0) and `variance`.
-fn gaussianise(plane: &mut [f32], exemplar: &Exemplar, variance: f64) -> Vec<f64> {
-    let usable = |i: usize| exemplar.usable.is_none_or(|u| u[i]);
-    let values = || plane.iter().enumerate().filter(|(i, _)| usable(*i)).map(|(_, v)| *v);
-    let (least, most) = values().fold((f32::MAX, f32::MIN), |(a, b), v| (a.min(v), b.max(v)));
-    let per_step = (STEPS_OF_VALUE - 1) as f64 / f64::from(most - least).max(f64::MIN_POSITIVE);
-    let step = |v: f32| (f64::from(v - least) * per_step).round() as usize;
-    let (mut counts, mut sums) = (vec![0u32; STEPS_OF_VALUE], vec![0.0f64; STEPS_OF_VALUE]);
-    for v in values() {
-        counts[step(v)] += 1;
-        sums[step(v)] += f64::from(v);
-    }
-    let total = f64::from(counts.iter().sum::<u32>());
-    let deviation = variance.sqrt();
-    // Equal samples share the middle of their ranks.
-    let mut below = 0.0;
-    let normals: Vec<f32> = counts
-        .iter()
-        .map(|&count| {
+/// A plane's histogram.
+struct Ranks {
+    least: f32,
+    per_step: f64,
+    /// For every step of value, a normally distributed number of the same rank and the plane's variance.
+    normals: Vec<f32>,
+    /// The histogram's values at the knots, of mean 0 and exactly the plane's variance.
+    knots: [f64; KNOTS.len()],
+}
+
+impl Ranks {
+    fn new(plane: &[f32], exemplar: &Exemplar, variance: f64) -> Self {
+        let values =
+            || plane.iter().enumerate().filter(|(i, _)| exemplar.counts(*i)).map(|(_, v)| *v);
+        let (least, most) = values().fold((f32::MAX, f32::MIN), |(a, b), v| (a.min(v), b.max(v)));
+        let per_step = (STEPS_OF_VALUE - 1) as f64 / f64::from(most - least).max(f64::MIN_POSITIVE);
+        let mut ranks = Self { least, per_step, normals: Vec::new(), knots: [0.0; KNOTS.len()] };
+        let (mut counts, mut sums) = (vec![0u32; STEPS_OF_VALUE], vec![0.0f64; STEPS_OF_VALUE]);
+        for v in values() {
+            counts[ranks.step(v)] += 1;
+            sums[ranks.step(v)] += f64::from(v);
+        }
+        ranks.knots = knots(&counts, &sums, variance);
+        let total = f64::from(counts.iter().sum::<u32>());
+        let deviation = variance.sqrt();
+        // Equal samples share the middle of their ranks.
+        let mut below = 0.0;
+        let normal = |&count: &u32| {
             let rank = below + 0.5 * f64::from(count);
             below += f64::from(count);
             if count == 0 { 0.0 } else { (normal::quantile(rank / total) * deviation) as f32 }
-        })
-        .collect();
-    let histogram = knots(&counts, &sums, variance);
-    for (i, v) in plane.iter_mut().enumerate() {
-        if usable(i) {
-            *v = normals[step(*v)];
+        };
+        ranks.normals = counts.iter().map(normal).collect();
+        ranks
+    }
+
+    fn step(&self, value: f32) -> usize {
+        (f64::from(value - self.least) * self.per_step).round() as usize
+    }
+
+    fn shape(&self) -> Shape {
+        Shape::new(&self.knots)
+    }
+
+    /// Replaces the samples by normally distributed ones (section 5).
+    fn gaussianise(&self, plane: &mut [f32], exemplar: &Exemplar) {
+        for (_, v) in plane.iter_mut().enumerate().filter(|(i, _)| exemplar.counts(*i)) {
+            *v = self.normals[self.step(*v)];
         }
     }
-    histogram
 }
 
 /// Values at the knots: the mean of the samples whose ranks lie around each, then moved and stretched so
 /// that mean and variance are right.
-fn knots(counts: &[u32], sums: &[f64], variance: f64) -> Vec<f64> {
+fn knots(counts: &[u32], sums: &[f64], variance: f64) -> [f64; KNOTS.len()] {
     let total = f64::from(counts.iter().sum::<u32>());
     // From half-way to the knot before to half-way to the one after, weighted towards the knot alone:
     // a narrow window where the distribution is dense, a wide one in the tails.
@@ -306,7 +356,7 @@ fn knots(counts: &[u32], sums: &[f64], variance: f64) -> Vec<f64> {
     }
     let (mean, got) = Shape::new(&values).moments();
     let gain = if got > 0.0 { (variance / got).sqrt() } else { 1.0 };
-    values.iter().map(|v| (v - mean) * gain).collect()
+    values.map(|v| (v - mean) * gain)
 }
 
 /// The non-negative x for which `matrix` x comes nearest to `target`, counted in shares of `target`: by

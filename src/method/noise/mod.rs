@@ -5,11 +5,14 @@
 //! pictures.
 
 pub mod document;
+mod edit;
 pub mod evaluate;
 pub mod fit;
+mod morph;
 pub mod raster;
 mod shape;
 
 pub use document::{Band, BandPart, BandShape, Channel, Document, MapSpec, Model, Score};
 pub use evaluate::{Evaluator, Filter};
+pub use morph::morph;
 pub use shape::{KNOTS, Shape};

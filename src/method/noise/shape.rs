@@ -49,6 +49,26 @@ impl Shape {
         c0 + t * (c1 + t * (c2 + t * c3))
     }
 
+    /// Squares of the coefficients of the 1st, 2nd, ... normalised Hermite polynomial, whose sum is the
+    /// variance of the value of a standard normal number, but for what higher ones hold.
+    pub fn hermite_squares(&self) -> [f64; 12] {
+        const STEPS: i32 = 2000;
+        let mut sums = [0.0; 12];
+        let mut weights = 0.0;
+        for i in -STEPS..=STEPS {
+            let u = 6.0 * f64::from(i) / f64::from(STEPS);
+            let (weight, value) = (normal::density(u), f64::from(self.at(u as f32)));
+            weights += weight;
+            // h_k+1 = (u h_k - sqrt(k) h_k-1) / sqrt(k + 1).
+            let (mut before, mut here) = (1.0, u);
+            for (k, sum) in (1..).map(f64::from).zip(&mut sums) {
+                *sum += weight * value * here;
+                (before, here) = (here, (u * here - k.sqrt() * before) / (k + 1.0).sqrt());
+            }
+        }
+        sums.map(|sum| (sum / weights).powi(2))
+    }
+
     /// Mean and variance of the value of a standard normal number.
     pub fn moments(&self) -> (f64, f64) {
         const STEPS: i32 = 2000;
@@ -125,5 +145,10 @@ mod tests {
         assert!((mean - 3.0).abs() < 1e-6);
         // What lies beyond 3.2 deviations is lost.
         assert!((variance - 0.25).abs() < 1e-3, "{variance}");
+        let squares = shape.hermite_squares();
+        assert!(
+            (squares[0] - 0.25).abs() < 2e-3 && squares[1..].iter().all(|c| *c < 1e-4),
+            "{squares:?}"
+        );
     }
 }

@@ -37,8 +37,14 @@ pub const LOWER_END: f64 = 0.210_224_103_813_428_64;
 /// Over how many octaves bands fade.
 const FADE: f64 = 0.5;
 
+/// Half of that, as a factor, and a little more.
+const EDGE: f64 = 1.19;
+
 /// Amplitude that fades in around the lower end.
 fn rise(f: f64) -> f64 {
+    if f > LOWER_END * EDGE {
+        return 1.0;
+    }
     let octaves = libm::log2((f / LOWER_END).max(1e-9));
     libm::sin(FRAC_PI_2 * (octaves / FADE + 0.5).clamp(0.0, 1.0))
 }
@@ -46,6 +52,9 @@ fn rise(f: f64) -> f64 {
 /// Amplitude that fades out around the upper end: with what rises at half the distance of coefficients it
 /// has even power.
 fn fall(f: f64) -> f64 {
+    if f < 2.0 * LOWER_END / EDGE {
+        return 1.0;
+    }
     let octaves = libm::log2((0.5 * f / LOWER_END).max(1e-9));
     libm::cos(FRAC_PI_2 * (octaves / FADE + 0.5).clamp(0.0, 1.0))
 }

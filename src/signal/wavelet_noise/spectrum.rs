@@ -22,7 +22,7 @@ pub fn expected(detail: Detail, levels: [u32; 2], (rows, cols): (usize, usize)) 
         for (power, &(fx, tx)) in line.iter_mut().zip(&across.transfer) {
             let transfer = tx * ty * scale;
             // Where the spline leaves nothing the coefficients do not matter.
-            if transfer > 1e-9 * scale {
+            if transfer > 1e-7 * scale {
                 *power = transfer * detail.power([fx, fy]);
             }
         }
@@ -71,19 +71,24 @@ impl Axis {
 
     /// What the window makes of the powers along this axis.
     fn blur(&self, line: &mut [f64]) {
-        let before = line.to_vec();
-        let at = |k: usize| before[k.min(self.n - k)];
+        let reach = self.moved.len() - 1;
+        // With the frequencies before the first and after the last, which are theirs mirrored.
+        let at = |k: usize| line[k.min(self.n - k)];
+        let sides = || (1..=reach).map(|m| m % self.n);
+        let padded: Vec<f64> = (sides().rev().map(at))
+            .chain(line.iter().copied())
+            .chain(sides().map(|m| at((line.len() - 1 + m) % self.n)))
+            .collect();
         for (k, power) in line.iter_mut().enumerate() {
-            let sides = self.moved.iter().enumerate().skip(1);
-            let sides =
-                sides.map(|(m, w)| w * (at((k + m) % self.n) + at((k + self.n - m) % self.n)));
-            *power = self.moved[0] * before[k] + sides.sum::<f64>();
+            let (below, above) = (&padded[k..=k + reach], &padded[k + reach..=k + 2 * reach]);
+            let both = below.iter().rev().zip(above).zip(&self.moved).skip(1);
+            *power = self.moved[0] * above[0] + both.map(|((b, a), w)| w * (a + b)).sum::<f64>();
         }
     }
 }
 
 /// Beyond so many frequencies the window moves no power worth counting.
-const REACH: usize = 24;
+const REACH: usize = 8;
 
 /// What share of a frequency's power the window of `n` samples moves by 0, 1, ... frequencies, to either
 /// side.

@@ -1,5 +1,6 @@
 //! Procedural textures by example: [`fit_noise`] and [`NoiseTexture`].
 
+mod edit;
 mod params;
 mod texture;
 
@@ -17,6 +18,7 @@ use crate::method::noise::document::MOST_CHANNELS;
 use crate::method::noise::fit::{self, Exemplar};
 use crate::method::noise::{BandShape, Document, MapSpec, Model, Score};
 
+pub use edit::{NoiseEdit, NoiseEditParams};
 pub use params::{Bands, Histogram, NoiseParams, Weights};
 pub use texture::{NoiseTexture, RenderParams, SampleType};
 
