@@ -3,9 +3,16 @@
 //! [`Program`] lists what every target needs; each target is one file that turns it into text.
 
 mod blender;
+mod glsl;
+mod hlsl;
 mod materialx;
+mod names;
 mod nodes;
+mod osl;
 mod program;
+mod shader;
+mod tile;
+mod wgsl;
 
 use crate::base::error::Result;
 use crate::base::params::choice;
@@ -49,9 +56,14 @@ pub struct ExportFile {
 /// # Errors
 /// [`Error::Format`](crate::Error::Format) if a picture cannot be written, which would be a bug.
 pub fn export(texture_name: &str, program: &Program, target: Target) -> Result<Vec<ExportFile>> {
+    let name = &names::identifier(texture_name, "texture");
     match target {
-        Target::Materialx => materialx::materialx(program, texture_name),
-        Target::Blender => Ok(blender::blender(program, texture_name)),
-        _ => Ok(Vec::new()),
+        Target::Glsl => glsl::glsl(name, program, false),
+        Target::GlslEs => glsl::glsl(name, program, true),
+        Target::Wgsl => wgsl::wgsl(name, program),
+        Target::Hlsl => hlsl::hlsl(name, program),
+        Target::Osl => Ok(osl::osl(name, program)),
+        Target::Materialx => materialx::materialx(program, name),
+        Target::Blender => Ok(blender::blender(program, name)),
     }
 }

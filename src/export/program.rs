@@ -2,8 +2,10 @@
 
 use crate::base::params::Value as _;
 use crate::image::material::MapKind;
+use crate::method::noise::document::Term;
 use crate::method::noise::{Evaluator, Filter};
 use crate::signal::wavelet_noise::Torus;
+use crate::signal::wavelet_noise::spectrum::at_pixels;
 
 /// A procedural texture on the plane as the numbers that a shader computes with.
 ///
@@ -20,7 +22,9 @@ use crate::signal::wavelet_noise::Torus;
 ///    the encodings of the maps, not clipped.
 ///
 /// To filter for samples that are f pixels apart, a term with l = min(`levels`) is multiplied by
-/// smoothstep of clamp(1 + l - log2 f, 0, 1).
+/// k = smoothstep of clamp(1 + l - log2 f, 0, 1). What is lost has a variance of d^2 = the sum over the terms
+/// of `shares[t]` (1 - k^2), in deviations, and the shape is replaced by its mean over a normal
+/// distribution of that variance, by three places: u - sqrt(3) d and u + sqrt(3) d count 1/6, u counts 2/3.
 #[derive(Debug, Clone)]
 pub struct Program {
     /// Tiles of coefficients: 16-bit integers of [`Torus::SIDE`] rows and columns, and their scale.
@@ -59,6 +63,8 @@ pub struct ProgramChannel {
     pub weights: Vec<f32>,
     /// By how many pixels each term is moved along x and y: whole numbers, less than 2^24.
     pub offsets: Vec<[u32; 2]>,
+    /// The share of each term in the variance.
+    pub shares: Vec<f32>,
     /// From noise to standard deviations.
     pub per_deviation: f32,
     /// Of every piece of the histogram's function: the knot where it begins, then c0 to c3 and r: with
@@ -94,7 +100,15 @@ impl Program {
                     let [x, y, _] = document.offset(t, [x, y, x], c);
                     [x, y]
                 };
+                let variance = |(w, term): (&f32, &Term)| {
+                    f64::from(*w).powi(2) * at_pixels(term.detail, term.levels)
+                };
+                let variances: Vec<f64> =
+                    filtered.weights.iter().zip(&document.terms()).map(variance).collect();
+                let total: f64 = variances.iter().sum();
+                let share = |v: &f64| if total > 0.0 { (v / total) as f32 } else { 0.0 };
                 ProgramChannel {
+                    shares: variances.iter().map(share).collect(),
                     weights: filtered.weights,
                     offsets: terms.iter().enumerate().map(offset).collect(),
                     per_deviation: filtered.per_deviation,
