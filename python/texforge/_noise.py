@@ -682,9 +682,10 @@ class NoiseTexture:
 
         Parameters
         ----------
-        target : {"glsl", "glsl-es", "wgsl", "hlsl", "osl"}
-            The language: desktop OpenGL and Vulkan; WebGL 2, Three.js and Godot; WebGPU; Unity and
-            Unreal; Blender's Cycles and other renderers.
+        target : {"glsl", "glsl-es", "wgsl", "hlsl", "osl", "materialx", "blender"}
+            The language: for desktop OpenGL and Vulkan; for WebGL 2, Three.js and Godot; for
+            WebGPU; for Unity and Unreal; for Cycles and other renderers; for Houdini, Maya, Unreal
+            and USD; or a Python script that builds a node group in Blender.
         name : str
             What files and functions are called; what cannot stand in a name becomes ``_``.
 
@@ -718,7 +719,7 @@ class NoiseTexture:
         ----------
         folder : path
             The folder.
-        target : {"glsl", "glsl-es", "wgsl", "hlsl", "osl"}
+        target : {"glsl", "glsl-es", "wgsl", "hlsl", "osl", "materialx", "blender"}
             As for `export`.
         name : str
             As for `export`.

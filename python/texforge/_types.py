@@ -91,7 +91,13 @@ Weights: TypeAlias = Literal["corrected"] | Literal["direct"]
 Histogram: TypeAlias = Literal["kept"] | Literal["normal"]
 """What becomes of the photo's histograms."""
 ExportTarget: TypeAlias = (
-    Literal["glsl"] | Literal["glsl-es"] | Literal["wgsl"] | Literal["hlsl"] | Literal["osl"]
+    Literal["glsl"]
+    | Literal["glsl-es"]
+    | Literal["wgsl"]
+    | Literal["hlsl"]
+    | Literal["osl"]
+    | Literal["materialx"]
+    | Literal["blender"]
 )
 """A language or a program that a procedural texture is written for."""
 SampleType: TypeAlias = Literal["uint8"] | Literal["uint16"] | Literal["float32"]
