@@ -46,7 +46,8 @@ pub use verb::extract::{
 pub use verb::inputs::Inputs;
 pub use verb::lattice::{Lattice, LatticeParams, detect_lattice, lattice_autocorrelation};
 pub use verb::noise::{
-    NamedMap, NoiseParams, NoiseReport, NoiseTexture, RenderParams, SampleType, fit_noise,
+    NamedMap, NoiseEdit, NoiseEditParams, NoiseParams, NoiseReport, NoiseTexture, RenderParams,
+    SampleType, fit_noise,
 };
 pub use verb::palette::{Palette, palette};
 pub use verb::params::{Axis, Follow, Measure, Method, Quality, Size, Symmetries, TileParams};

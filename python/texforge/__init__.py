@@ -4,7 +4,8 @@
 and says which pixel of the photo each of its pixels is, so that other maps of the same material
 can follow (`apply`). `palette` shows how even it can become. `detect_lattice` finds by which
 displacements a photo of bricks, tiles or cloth repeats, `extract` cuts out the tile of such a photo
-that stands best for all of it, `regular` makes a texture of any size from it. `texture_cost`
+that stands best for all of it, `regular` makes a texture of any size from it. `fit_noise` makes
+a procedural texture of a photo: a kilobyte that has a value at every point. `texture_cost`
 measures how much a texture looks like its photo.
 `read_image` and `write_image` keep all the bits that files have. `study` compares the ways to
 tile over many photos.
@@ -22,6 +23,7 @@ from texforge._api import (
 from texforge._errors import (
     AccessError,
     Cancelled,
+    DocumentError,
     FileError,
     FormatError,
     InternalError,
@@ -38,15 +40,19 @@ from texforge._errors import (
 from texforge._extract import ExtractedTile, Extraction, extract
 from texforge._lattice import detect_lattice
 from texforge._measure import texture_cost
+from texforge._noise import NoiseTexture, fit_noise
 from texforge._palette import Palette, palette
 from texforge._regular import regular
 from texforge._study import Study, study
 from texforge._texforge import __version__
 from texforge._types import (
     Axis,
+    Bands,
     Costs,
     Encoding,
+    ExportTarget,
     Follow,
+    Histogram,
     Image,
     ImageLike,
     Lattice,
@@ -59,6 +65,7 @@ from texforge._types import (
     ProgressBar,
     Quality,
     Regular,
+    SampleType,
     Scaling,
     Seam,
     Snap,
@@ -70,19 +77,24 @@ from texforge._types import (
     Tile,
     Tileable,
     TileOptions,
+    Weights,
 )
 
 __all__ = [
     "AccessError",
     "Axis",
+    "Bands",
     "Cancelled",
     "Costs",
+    "DocumentError",
     "Encoding",
+    "ExportTarget",
     "ExtractedTile",
     "Extraction",
     "FileError",
     "Follow",
     "FormatError",
+    "Histogram",
     "Image",
     "ImageLike",
     "InternalError",
@@ -93,6 +105,7 @@ __all__ = [
     "Method",
     "MissingFileError",
     "NoStructureError",
+    "NoiseTexture",
     "OutOfMemory",
     "OutputExistsError",
     "Palette",
@@ -105,6 +118,7 @@ __all__ = [
     "ReadError",
     "Regular",
     "SameFileError",
+    "SampleType",
     "Scaling",
     "Seam",
     "Snap",
@@ -118,10 +132,12 @@ __all__ = [
     "Tile",
     "TileOptions",
     "Tileable",
+    "Weights",
     "__version__",
     "apply",
     "detect_lattice",
     "extract",
+    "fit_noise",
     "load_source_map",
     "palette",
     "read_image",

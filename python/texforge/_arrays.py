@@ -203,14 +203,19 @@ def integer(name: str, value: Any, low: int = 0, high: int = 2**64 - 1) -> int:
     return number
 
 
-def number(name: str, value: Any) -> str:
-    """Return an argument that must be a number as the text that the core reads."""
+def real(name: str, value: Any) -> float:
+    """Return an argument that must be a number."""
     try:
-        return repr(float(value))
-    except (TypeError, ValueError):
+        return float(value)
+    except (TypeError, ValueError, OverflowError):
         raise ParameterError(
             f"`{name}` must be a number, got {value!r}", fields={"name": name}
         ) from None
+
+
+def number(name: str, value: Any) -> str:
+    """Return an argument that must be a number as the text that the core reads."""
+    return repr(real(name, value))
 
 
 def word(name: str, value: object) -> str:

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 __all__ = [
     "AccessError",
     "Cancelled",
+    "DocumentError",
     "FileError",
     "FormatError",
     "InternalError",
@@ -75,6 +76,12 @@ class NoStructureError(TexforgeError, ValueError):
     """The picture lacks the structure that is asked for: it does not repeat, say."""
 
     default_kind = "no_structure"
+
+
+class DocumentError(TexforgeError, ValueError):
+    """The document of a procedural texture is damaged or of a later version."""
+
+    default_kind = "document"
 
 
 class OutOfMemory(TexforgeError, MemoryError):
@@ -149,6 +156,7 @@ _CLASSES: dict[str, type[TexforgeError]] = {
     "size_mismatch": PictureError,
     "bad_picture": PictureError,
     "no_structure": NoStructureError,
+    "document": DocumentError,
     "memory": OutOfMemory,
     "decode": ReadError,
     "format": FormatError,

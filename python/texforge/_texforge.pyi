@@ -1,7 +1,7 @@
 """The compiled module. Private: `_api.py` is its only caller."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, final
 
 _Picture = tuple[Any, str, tuple[int, int, int], str]
 _PictureOut = tuple[bytearray, str, tuple[int, int, int], str]
@@ -20,14 +20,17 @@ _Extracted = tuple[
 _TileOut = tuple[_PictureOut, _MapOut | None, list[tuple[str, _PictureOut]], str, list[_Step]]
 
 __all__ = [
+    "Noise",
     "__version__",
     "apply",
     "cli_main",
     "cli_study",
     "encode_png",
     "error_kinds",
+    "export_targets",
     "extract",
     "fail",
+    "fit_noise",
     "lattice",
     "lattice_overlay",
     "lattice_snap",
@@ -39,11 +42,73 @@ __all__ = [
     "texture_cost",
     "tiles",
     "write",
+    "write_files",
     "write_source_map",
 ]
 
 __version__: str
 
+@final
+class Noise:
+    @staticmethod
+    def from_json(text: str) -> Noise: ...
+    @staticmethod
+    def load(path: str) -> Noise: ...
+    def to_json(self) -> str: ...
+    def at(
+        self,
+        *,
+        points: Any,
+        count: int,
+        axes: int,
+        normals: Any,
+        footprint: float,
+        keep_contrast: bool,
+        threads: int,
+    ) -> bytearray: ...
+    def volume(
+        self,
+        *,
+        shape: list[int],
+        scale: float,
+        origin: list[float],
+        keep_contrast: bool,
+        threads: int,
+        progress: Callable[[float], object] | None,
+    ) -> bytearray: ...
+    def render(
+        self,
+        *,
+        size: _Size,
+        scale: float,
+        origin: list[float],
+        tileable: bool,
+        keep_contrast: bool,
+        dtype: str,
+        only: str | None,
+        threads: int,
+        progress: Callable[[float], object] | None,
+    ) -> list[tuple[str, _PictureOut]]: ...
+    def morph(self, *, other: Noise, t: float) -> Noise: ...
+    def edit(
+        self,
+        *,
+        params: list[tuple[str, str]],
+        gains: list[float],
+        means: list[tuple[str, list[float]]],
+        seed: int | None,
+    ) -> Noise: ...
+    def export(self, *, target: str, name: str) -> list[tuple[str, bytes]]: ...
+
+def fit_noise(
+    *,
+    maps: list[tuple[str, _Picture, str]],
+    mask: _Picture | None,
+    params: list[tuple[str, str]],
+    seed: int,
+    threads: int,
+    progress: Callable[[float], object] | None,
+) -> tuple[Noise, str]: ...
 def tiles(
     *,
     photo: _Picture,
@@ -109,6 +174,8 @@ def read(*, path: str, kind: str) -> _PictureOut: ...
 def write(
     *, path: str, picture: _Picture, kind: str, record: str | None, overwrite: bool
 ) -> None: ...
+def export_targets() -> list[str]: ...
+def write_files(*, files: list[tuple[str, bytes]], overwrite: bool) -> None: ...
 def encode_png(*, picture: _Picture) -> bytes: ...
 def read_source_map(*, path: str) -> _MapOut: ...
 def write_source_map(*, path: str, source_map: _Map, overwrite: bool) -> None: ...

@@ -24,9 +24,12 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Axis",
+    "Bands",
     "Costs",
     "Encoding",
+    "ExportTarget",
     "Follow",
+    "Histogram",
     "Image",
     "ImageLike",
     "Lattice",
@@ -39,6 +42,7 @@ __all__ = [
     "ProgressBar",
     "Quality",
     "Regular",
+    "SampleType",
     "Scaling",
     "Seam",
     "Snap",
@@ -50,6 +54,7 @@ __all__ = [
     "Tile",
     "TileOptions",
     "Tileable",
+    "Weights",
 ]
 
 # Unions, not Literal["a", "b"]: mypy holds both for the same, stubtest only the union.
@@ -79,6 +84,24 @@ Matching: TypeAlias = Literal["color"] | Literal["correlation"]
 """By what a piece for a gap is chosen."""
 Seam: TypeAlias = Literal["graph"] | Literal["cut"] | Literal["linear"]
 """How pieces are joined."""
+Bands: TypeAlias = Literal["round"] | Literal["square"]
+"""The shape of a noise's bands in the spectrum."""
+Weights: TypeAlias = Literal["corrected"] | Literal["direct"]
+"""How the bands' weights follow from the photo's spectrum."""
+Histogram: TypeAlias = Literal["kept"] | Literal["normal"]
+"""What becomes of the photo's histograms."""
+ExportTarget: TypeAlias = (
+    Literal["glsl"]
+    | Literal["glsl-es"]
+    | Literal["wgsl"]
+    | Literal["hlsl"]
+    | Literal["osl"]
+    | Literal["materialx"]
+    | Literal["blender"]
+)
+"""A language or a program that a procedural texture is written for."""
+SampleType: TypeAlias = Literal["uint8"] | Literal["uint16"] | Literal["float32"]
+"""The samples of a rendered picture."""
 Encoding: TypeAlias = Literal["srgb"] | Literal["linear"] | Literal["data"]
 """What the numbers of a picture mean."""
 MapKind: TypeAlias = (

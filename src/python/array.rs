@@ -18,7 +18,7 @@ use crate::image::symmetry::Symmetry;
 use crate::with_samples;
 
 /// Fills a new vector of `len` items from the bytes of a buffer.
-fn copied<T: bytemuck::Pod>(
+pub(super) fn copied<T: bytemuck::Pod>(
     py: Python<'_>,
     buffer: &Bound<'_, PyAny>,
     len: usize,
@@ -87,7 +87,8 @@ pub(super) fn array_out<'py>(py: Python<'py>, picture: &Picture) -> PyResult<Arr
     Ok((bytes, picture.samples().dtype(), shape, encoding))
 }
 
-fn bytes_out<'py>(py: Python<'py>, bytes: &[u8]) -> PyResult<Bound<'py, PyByteArray>> {
+/// Bytes, copied into memory that Python owns.
+pub(super) fn bytes_out<'py>(py: Python<'py>, bytes: &[u8]) -> PyResult<Bound<'py, PyByteArray>> {
     PyByteArray::new_with(py, bytes.len(), |out| {
         out.copy_from_slice(bytes);
         Ok(())

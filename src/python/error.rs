@@ -58,6 +58,7 @@ fn fields<'py>(py: Python<'py>, error: &Error) -> PyResult<Bound<'py, PyDict>> {
             dict.set_item("confidence", confidence)?;
             dict.set_item("least", least)?;
         }
+        Error::Document { reason } => dict.set_item("reason", reason)?,
         Error::Memory { what, need_mib, available_mib } => {
             dict.set_item("what", what)?;
             dict.set_item("need_mib", need_mib)?;
@@ -118,6 +119,7 @@ pub(super) fn example(kind: &str) -> Result<()> {
         ErrorKind::NoStructure => {
             Error::NoStructure { what: what(), confidence: 0.1, least: 0.5, remedy: what() }
         }
+        ErrorKind::Document => Error::Document { reason: what() },
         ErrorKind::Memory => Error::Memory { what: what(), need_mib: 2, available_mib: 1 },
         ErrorKind::Decode => Error::Decode { path: path(), reason: what() },
         ErrorKind::Format => Error::Format { path: path(), reason: what() },

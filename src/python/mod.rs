@@ -9,6 +9,7 @@ mod array;
 mod enter;
 mod error;
 mod extract;
+mod noise;
 mod regular;
 
 use std::ffi::OsString;
@@ -31,6 +32,7 @@ use crate::image::sigma_map::SigmaMap;
 use crate::verb::extract::ExtractParams;
 use crate::verb::inputs::Inputs;
 use crate::verb::lattice::{Lattice, LatticeParams, detect_lattice, lattice_autocorrelation};
+use crate::verb::noise::{NoiseEditParams, NoiseParams};
 use crate::verb::params::TileParams;
 use crate::verb::redo::Redo;
 use crate::verb::regular::RegularParams;
@@ -360,8 +362,8 @@ fn map_kind(name: &str) -> String {
     material::classify(name).map_or(MapKind::Data, |(_, kind)| kind).show()
 }
 
-/// Every parameter of a Python function (`texture_cost`, `detect_lattice`, `extract`, `regular`, else
-/// `tile`), with its default as text.
+/// Every parameter of a Python function (`texture_cost`, `detect_lattice`, `extract`, `regular`,
+/// `fit_noise`, `edit` of a procedural texture, else `tile`), with its default as text.
 #[pyfunction]
 #[pyo3(signature = (verb = "tile"))]
 fn schema<'py>(py: Python<'py>, verb: &str) -> PyResult<Vec<Bound<'py, PyDict>>> {
@@ -381,6 +383,8 @@ fn schema<'py>(py: Python<'py>, verb: &str) -> PyResult<Vec<Bound<'py, PyDict>>>
         "detect_lattice" => LatticeParams::schema(),
         ExtractParams::VERB => ExtractParams::schema(),
         RegularParams::VERB => RegularParams::schema(),
+        "fit_noise" => NoiseParams::schema(),
+        "edit" => NoiseEditParams::schema(),
         _ => TileParams::schema(),
     };
     params.into_iter().map(entry).collect()
@@ -431,6 +435,8 @@ fn cli_study(py: Python<'_>, args: Vec<OsString>) -> PyResult<(u8, Option<Bound<
 mod _texforge {
     #[pymodule_export]
     use super::extract::extract;
+    #[pymodule_export]
+    use super::noise::{Noise, export_targets, fit_noise, write_files};
     #[pymodule_export]
     use super::regular::regular;
     #[pymodule_export]

@@ -7,6 +7,7 @@
 
 mod exif;
 mod exr;
+mod files;
 mod icc;
 mod jpeg;
 mod other;
@@ -26,6 +27,7 @@ use crate::base::memory::ensure_available;
 use crate::image::material::MapKind;
 use crate::image::picture::{Encoding, Meta, Picture, Samples};
 
+pub use files::{read_text, write_files};
 pub use place::check_output;
 pub use record::read_record;
 pub use rows::write_rows;

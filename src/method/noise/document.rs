@@ -172,7 +172,8 @@ impl Document {
     }
 
     /// With all numbers rounded to six digits, as they are written.
-    pub(super) fn rounded(mut self) -> Self {
+    #[must_use]
+    pub fn rounded(mut self) -> Self {
         let round = |values: &mut Vec<f64>| values.iter_mut().for_each(|v| *v = six_digits(*v));
         round(&mut self.mean);
         self.matrix.iter_mut().for_each(round);
@@ -261,7 +262,7 @@ impl Document {
     }
 
     /// Checks all that reading it does not.
-    fn validate(&self) -> Result<()> {
+    pub(crate) fn validate(&self) -> Result<()> {
         let bad = |reason: String| Err(Error::Document { reason });
         let channels: usize = self.maps.iter().fold(0, |sum, map| sum.saturating_add(map.channels));
         if !(1..=MOST_CHANNELS).contains(&channels) || self.maps.iter().any(|map| map.channels == 0)

@@ -128,8 +128,10 @@ impl Evaluator {
         let of = |channel: &ChannelEvaluator| {
             let total: f64 = channel.variances.iter().sum();
             let left: f64 = channel.variances.iter().zip(&kept).map(|(v, k)| v * k * k).sum();
-            let gain = if filter.keep_contrast && left > 0.0 { (total / left).sqrt() } else { 1.0 };
-            let lost = if filter.keep_contrast { 0.0 } else { (total - left).max(0.0) };
+            // Where nothing is left there is nothing to strengthen.
+            let keep = filter.keep_contrast && left > 0.0;
+            let gain = if keep { (total / left).sqrt() } else { 1.0 };
+            let lost = if keep { 0.0 } else { (total - left).max(0.0) };
             let weight = |(w, k): (&f32, &f64)| (f64::from(*w) * k * gain) as f32;
             Filtered {
                 weights: channel.weights.iter().zip(&kept).map(weight).collect(),

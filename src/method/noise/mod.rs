@@ -5,14 +5,17 @@
 //! pictures.
 
 pub mod document;
+mod edit;
 pub mod evaluate;
 pub mod fit;
+mod morph;
 pub mod oriented;
-mod ranks;
 pub mod raster;
+mod ranks;
 pub mod score;
 mod shape;
 
 pub use document::{Band, BandShape, Channel, Document, MapSpec, Model, Score};
 pub use evaluate::{Evaluator, Filter};
+pub use morph::morph;
 pub use shape::{KNOTS, Shape};

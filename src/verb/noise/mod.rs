@@ -1,5 +1,6 @@
 //! Procedural textures by example: [`fit_noise`] and [`NoiseTexture`].
 
+mod edit;
 mod params;
 mod texture;
 
@@ -19,6 +20,7 @@ use crate::method::noise::oriented;
 use crate::method::noise::score::Structure;
 use crate::method::noise::{BandShape, Document, MapSpec, Model, Score};
 
+pub use edit::{NoiseEdit, NoiseEditParams};
 pub use params::{Bands, Directions, Histogram, NoiseParams, Weights};
 pub use texture::{NoiseTexture, RenderParams, SampleType};
 

@@ -8,6 +8,7 @@ use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
 use crate::base::memory::ensure_available;
 use crate::base::params::Value as _;
+use crate::export::Program;
 use crate::image::material::MapKind;
 use crate::image::picture::{Encoding, Picture, Sample as _, Samples};
 use crate::method::noise::raster::{self, View};
@@ -82,6 +83,11 @@ impl NoiseTexture {
         self.evaluator.document()
     }
 
+    /// The numbers that a shader needs to compute it.
+    pub fn program(&self) -> Program {
+        Program::new(&self.evaluator)
+    }
+
     /// Number of channels of a value: those of all maps, one after the other.
     pub fn channels(&self) -> usize {
         self.evaluator.channels()
@@ -116,15 +122,64 @@ impl NoiseTexture {
         filter: Filter,
     ) -> Result<Vec<f32>> {
         ensure_points(points, filter)?;
-        if !matches!(self.document().model, Model::Wavelet { .. }) {
-            let expected = "points on the plane (x, y) for this texture, which has directions";
-            return Err(Error::parameter("points", expected, "points in space"));
-        }
+        self.ensure_solid("points")?;
         let normals = normals.map(|normals| unit(normals, points.len())).transpose()?;
         self.chunked(ctx, points, |first, points, out| {
             let normals = normals.as_ref().map(|n| &n[first..][..points.len()]);
             self.evaluator.solid(points, normals, filter, out);
         })
+    }
+
+    /// A block of the solid texture: (depth, height, width) voxels, `scale` pixels of the photo apart, with
+    /// a corner at `origin` (x, y, z); for every voxel all channels, at its middle the bits of
+    /// [`NoiseTexture::solid`].
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a side of 0 or more than 65536 voxels, a scale or an origin out of range, and
+    /// for oriented noise; [`Error::Memory`]; [`Error::Cancelled`].
+    pub fn volume(
+        &self,
+        ctx: &Ctx,
+        shape: [usize; 3],
+        scale: f64,
+        origin: [f64; 3],
+        keep_contrast: bool,
+    ) -> Result<Vec<f32>> {
+        let [depth, height, width] = shape;
+        if shape.iter().any(|n| !(1..=Picture::MAX_SIDE).contains(n)) {
+            let expected = format!("1 to {} voxels a side", Picture::MAX_SIDE);
+            return Err(Error::parameter("shape", expected, format!("{depth}x{height}x{width}")));
+        }
+        ensure_place(scale, &origin)?;
+        self.ensure_solid("shape")?;
+        let channels = self.channels();
+        let voxels = shape.iter().try_fold(1_usize, |n, &side| n.checked_mul(side));
+        // The values, and a copy for whoever asked.
+        let bytes = voxels.and_then(|n| n.checked_mul(channels * 8));
+        ensure_available("the volume", bytes.map(|n| n as u64))?;
+        let mut out = vec![0.0; depth * height * width * channels];
+        let filter = Filter { footprint: footprint(scale), keep_contrast };
+        let at = |i: usize, axis: usize| origin[axis] + (i as f64 + 0.5) * scale;
+        ctx.begin((depth * height) as u64);
+        ctx.install(|| {
+            let rows = out.par_chunks_mut(width * channels).enumerate();
+            rows.try_for_each(|(row, out)| {
+                let (z, y) = (at(row / height, 2), at(row % height, 1));
+                let points: Vec<_> = (0..width).map(|x| [at(x, 0), y, z]).collect();
+                self.evaluator.solid(&points, None, filter, out);
+                ctx.step(1)
+            })
+        })?;
+        Ok(out)
+    }
+
+    /// Fails, about parameter `name`, if the texture has no third axis.
+    fn ensure_solid(&self, name: &'static str) -> Result<()> {
+        if matches!(self.document().model, Model::Wavelet { .. }) {
+            return Ok(());
+        }
+        let expected = "of two axes (x, y) for this texture, which has directions";
+        Err(Error::parameter(name, expected, "three"))
     }
 
     fn chunked<P: Sync>(
@@ -167,12 +222,7 @@ impl NoiseTexture {
                 format!("{width}x{height}"),
             ));
         }
-        if !(1e-3..=1e4).contains(&params.scale) {
-            return Err(Error::parameter("scale", "0.001 to 10000", params.scale));
-        }
-        if let Some(bad) = params.origin.iter().find(|v| v.is_nan() || v.abs() > FARTHEST) {
-            return Err(Error::parameter("origin", format!("within {FARTHEST:e} pixels"), bad));
-        }
+        ensure_place(params.scale, &params.origin)?;
         let matches = |m: &Model| matches!(m, Model::Oriented { angle, .. } if *angle != 0.0);
         if params.tileable && matches(&self.document().model) {
             let expected = "off for this texture, whose directions are turned";
@@ -186,9 +236,8 @@ impl NoiseTexture {
             origin: params.origin,
             tileable: params.tileable,
         };
-        // A picture as large as the photo's pixels, or larger, holds all bands.
-        let footprint = if params.scale > 1.0 { params.scale } else { 0.0 };
-        let filter = Filter { footprint, keep_contrast: params.keep_contrast };
+        let filter =
+            Filter { footprint: footprint(params.scale), keep_contrast: params.keep_contrast };
         ctx.begin(height as u64);
         let values = ctx.install(|| raster::render(ctx, &self.evaluator, &view, filter))?;
         let mut first = 0;
@@ -245,6 +294,21 @@ fn upright(stored: &mut [f32]) {
 
 /// Beyond so many pixels neighbouring points are no longer told apart well.
 const FARTHEST: f64 = 1e9;
+
+/// Pixels as near to each other as the photo's, or nearer, hold all bands.
+fn footprint(scale: f64) -> f64 {
+    if scale > 1.0 { scale } else { 0.0 }
+}
+
+fn ensure_place(scale: f64, origin: &[f64]) -> Result<()> {
+    if !(1e-3..=1e4).contains(&scale) {
+        return Err(Error::parameter("scale", "0.001 to 10000", scale));
+    }
+    if let Some(bad) = origin.iter().find(|v| v.is_nan() || v.abs() > FARTHEST) {
+        return Err(Error::parameter("origin", format!("within {FARTHEST:e} pixels"), bad));
+    }
+    Ok(())
+}
 
 fn ensure_points<const N: usize>(points: &[[f64; N]], filter: Filter) -> Result<()> {
     if let Some(bad) = points.iter().flatten().find(|v| v.is_nan() || v.abs() > FARTHEST) {
