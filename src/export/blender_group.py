@@ -252,5 +252,3 @@ def build(texture):
         for value in shown(graph, values[first:last], image):
             graph.connect(value, next(sink))
         first = last
-
-

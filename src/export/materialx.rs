@@ -62,8 +62,7 @@ fn drawn(integers: &[i16], scale: f32, shifts: &[[usize; 2]]) -> Result<Vec<u8>>
         shifts.iter().map(move |[dx, dy]| ((x + dx * FINE) % side, (y + dy * FINE) % side))
     });
     let samples = pixels.map(|(x, y)| f16::from_f32(plane[y * side + x])).collect();
-    let picture =
-        Picture::new(side, side, shifts.len(), Samples::F16(samples), Encoding::Data)?;
+    let picture = Picture::new(side, side, shifts.len(), Samples::F16(samples), Encoding::Data)?;
     encode(&picture, Format::Exr, &WriteOptions::new(MapKind::Data))
 }
 
@@ -203,8 +202,7 @@ impl Graph {
                     continue;
                 }
                 let name = |what: &str| format!("band{t}_{what}");
-                let place =
-                    self.two("add", &name("place"), &band, In::Numbers(&group.offsets[t]));
+                let place = self.two("add", &name("place"), &band, In::Numbers(&group.offsets[t]));
                 let file = picture(term.tile);
                 let inputs = [
                     ("file", In::Word("filename", &file)),
@@ -282,7 +280,8 @@ impl Graph {
             });
         }
         let noise = sum.unwrap_or_else(|| Node { name: String::new(), kind: "float" });
-        let noise = self.two("multiply", &format!("value{i}_noise"), &noise, In::Port("contrast", "float"));
+        let noise =
+            self.two("multiply", &format!("value{i}_noise"), &noise, In::Port("contrast", "float"));
         let mean = [f64::from(program.mean[i])];
         self.two("add", &format!("value{i}_encoded"), &noise, In::Numbers(&mean))
     }
@@ -327,8 +326,7 @@ impl Graph {
 
     /// Within 0 and 1, as a picture would be.
     fn clamped(&mut self, name: &str, value: &Node) -> Node {
-        let inputs =
-            [("in", In::Node(value)), ("low", In::Number(0.0)), ("high", In::Number(1.0))];
+        let inputs = [("in", In::Node(value)), ("low", In::Number(0.0)), ("high", In::Number(1.0))];
         self.node("clamp", value.kind, &format!("{name}_clamped"), &inputs)
     }
 
@@ -395,7 +393,8 @@ fn document(name: &str, graph: &Graph, outputs: &[Output]) -> String {
         if let Some((_, input, _)) = SURFACE.iter().find(|s| (s.0, s.2) == (map, kind)) {
             let _ = writeln!(surface, r#"    <input name="{input}" type="{kind}" {from} />"#);
             if let Some(weight) = input.strip_suffix("_color") {
-                let _ = writeln!(surface, r#"    <input name="{weight}" type="float" value="1" />"#);
+                let _ =
+                    writeln!(surface, r#"    <input name="{weight}" type="float" value="1" />"#);
             }
         } else if *is_normal && kind == "vector3" && normal.is_empty() {
             normal = format!(
