@@ -7,13 +7,17 @@ use pyo3::types::{PyByteArray, PyBytes};
 
 use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
+use crate::base::params::Value as _;
+use crate::export::{Target, export};
 use crate::image::io;
 use crate::image::mask::Mask;
 use crate::method::noise::Filter;
 use crate::python::array::{ArrayIn, ArrayOut, array_out, bytes_out, copied};
 use crate::python::error::IntoPy as _;
 use crate::python::{enter, kind_named, mask_of};
-use crate::verb::noise::{self, NamedMap, NoiseParams, NoiseTexture, RenderParams, SampleType};
+use crate::verb::noise::{
+    self, NamedMap, NoiseEdit, NoiseParams, NoiseTexture, RenderParams, SampleType,
+};
 
 /// A map to fit: its name, its samples, what its numbers are.
 type MapIn<'py> = (String, ArrayIn<'py>, String);
@@ -193,6 +197,53 @@ impl Noise {
             .map(|(name, _, picture)| Ok((name.clone(), array_out(py, picture)?)))
             .collect()
     }
+
+    /// The texture between this and another.
+    #[pyo3(signature = (*, other, t))]
+    fn morph(&self, py: Python<'_>, other: &Self, t: f64) -> PyResult<Self> {
+        let (texture, other) = (self.0.clone(), other.0.clone());
+        enter::unheard(py, move || texture.morph(&other, t)).map(Self)
+    }
+
+    /// The texture with changes.
+    #[pyo3(signature = (*, params, gains, means, seed))]
+    fn edit(
+        &self,
+        py: Python<'_>,
+        params: Vec<(String, String)>,
+        gains: Vec<f64>,
+        means: Vec<(String, Vec<f64>)>,
+        seed: Option<u32>,
+    ) -> PyResult<Self> {
+        let mut edit = NoiseEdit { gains, means, seed, ..NoiseEdit::default() };
+        for (name, text) in &params {
+            edit.params.set(name, text).into_py(py)?;
+        }
+        let texture = self.0.clone();
+        enter::unheard(py, move || texture.edit(&edit)).map(Self)
+    }
+
+    /// Files of the texture for a target, by name.
+    #[pyo3(signature = (*, target, name))]
+    fn export<'py>(
+        &self,
+        py: Python<'py>,
+        target: &str,
+        name: String,
+    ) -> PyResult<Vec<(String, Bound<'py, PyBytes>)>> {
+        let target = Target::parse(target)
+            .ok_or_else(|| Error::parameter("target", Target::expected(), format!("`{target}`")))
+            .into_py(py)?;
+        let texture = self.0.clone();
+        let files = enter::unheard(py, move || export(&name, &texture.program(), target))?;
+        Ok(files.into_iter().map(|f| (f.name, PyBytes::new(py, &f.bytes))).collect())
+    }
+}
+
+/// The targets of exports.
+#[pyfunction]
+pub(super) fn export_targets() -> Vec<&'static str> {
+    Target::CHOICES.to_vec()
 }
 
 /// Writes files, each whole or not at all.

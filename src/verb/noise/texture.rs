@@ -8,6 +8,7 @@ use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
 use crate::base::memory::ensure_available;
 use crate::base::params::Value as _;
+use crate::export::Program;
 use crate::image::material::MapKind;
 use crate::image::picture::{Encoding, Picture, Sample as _, Samples};
 use crate::method::noise::raster::{self, View};
@@ -80,6 +81,11 @@ impl NoiseTexture {
     /// What the texture consists of.
     pub fn document(&self) -> &Document {
         self.evaluator.document()
+    }
+
+    /// The numbers that a shader needs to compute it.
+    pub fn program(&self) -> Program {
+        Program::new(&self.evaluator)
     }
 
     /// Number of channels of a value: those of all maps, one after the other.
