@@ -4,10 +4,6 @@
 //! draws the coefficients of cubic splines, which Blender can look up: with 3 samples to a coefficient the
 //! error of a band is 0.3 to 0.4 % of its amplitude.
 
-use std::io::Write as _;
-
-use flate2::Compression;
-use flate2::write::ZlibEncoder;
 use serde_json::{Value, json};
 
 use super::nodes::{Group, Nodes, TOGETHER};
@@ -86,27 +82,35 @@ fn group(group: &Group) -> Value {
     json!({ "offsets": group.offsets, "weights": group.weights, "shape": shape })
 }
 
-/// Integers, little end first, by zlib, as lines of base 64.
+/// Integers, little end first, as lines of base 64. (Random numbers: compression would gain 6 %.)
 fn packed(integers: &[i16]) -> String {
-    let bytes: Vec<u8> = integers.iter().flat_map(|v| v.to_le_bytes()).collect();
-    let mut encoder = ZlibEncoder::new(Vec::new(), Compression::best());
-    // Into memory: that does not fail.
-    let bytes = match encoder.write_all(&bytes) {
-        Ok(()) => encoder.finish().unwrap_or_default(),
-        Err(_) => Vec::new(),
-    };
     const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    const GROUPS_IN_A_LINE: usize = 25;
+    let bytes: Vec<u8> = integers.iter().flat_map(|v| v.to_le_bytes()).collect();
     let mut text = String::new();
-    for (i, three) in bytes.chunks(3).enumerate() {
-        let word = three.iter().fold(0u32, |word, &byte| word << 8 | u32::from(byte));
-        let word = word << (8 * (3 - three.len()));
+    for (i, group) in bytes.chunks(3).enumerate() {
+        let byte = |k: usize| u32::from(group.get(k).copied().unwrap_or(0));
+        let word = (byte(0) << 16) | (byte(1) << 8) | byte(2);
         for k in 0..4 {
-            let digit = DIGITS[(word >> (18 - 6 * k) & 63) as usize];
-            text.push(if k <= three.len() { char::from(digit) } else { '=' });
+            let digit = DIGITS[((word >> (18 - 6 * k)) & 63) as usize];
+            text.push(if k <= group.len() { char::from(digit) } else { '=' });
         }
-        if i % 25 == 24 {
+        if i % GROUPS_IN_A_LINE == GROUPS_IN_A_LINE - 1 {
             text.push('\n');
         }
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn integers_are_written_in_base_64() {
+        // By Python: base64.b64encode(numpy.array([1, -2, 3, 4], "<i2")).
+        assert_eq!(packed(&[1, -2, 3, 4]), "AQD+/wMABAA=");
+        assert_eq!(packed(&[1, -2, 3]), "AQD+/wMA");
+        assert_eq!(packed(&[-32768]), "AIA=");
+    }
 }

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import base64
-import zlib
 
 import bpy
 import numpy as np
@@ -54,8 +53,7 @@ class Graph:
 
 def spread(text):
     """Return the coefficients of a tile from their text."""
-    packed = zlib.decompress(base64.b64decode("".join(text.split())))
-    return np.frombuffer(packed, "<i2").reshape(SIDE, SIDE).astype(np.float64)
+    return np.frombuffer(base64.b64decode(text), "<i2").reshape(SIDE, SIDE).astype(np.float64)
 
 
 def drawn(coefficients):
@@ -252,5 +250,3 @@ def build(texture):
         for value in shown(graph, values[first:last], image):
             graph.connect(value, next(sink))
         first = last
-
-

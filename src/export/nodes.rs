@@ -131,3 +131,80 @@ impl GroupShape {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::method::noise::{
+        Band, BandPart, Channel, Document, Evaluator, MapSpec, Model, Score, Shape,
+    };
+
+    /// Five channels, every other one with a histogram; bands that differ along the axes.
+    fn program() -> (Program, Vec<f64>) {
+        let histogram: Vec<f64> = KNOTS.iter().map(|u| 0.3 * u + 0.05 * u * u.abs()).collect();
+        let channels = (0..5).map(|k| Channel {
+            weights: vec![0.1, 0.2],
+            histogram: (k % 2 == 0).then(|| histogram.clone()),
+        });
+        let bands = vec![
+            Band { levels: [0, 3], parts: [BandPart::Fine, BandPart::Low] },
+            Band { levels: [5, 2], parts: [BandPart::Low, BandPart::Band] },
+        ];
+        let map = MapSpec {
+            name: "all".into(),
+            kind: "data".into(),
+            encoding: "data".into(),
+            channels: 5,
+        };
+        let document = Document::new(
+            7,
+            [60, 40],
+            vec![map],
+            vec![0.0; 5],
+            vec![vec![1.0; 5]; 5],
+            Model::Oriented { angle: 20.0, bands, channels: channels.collect() },
+            Score { fit: 0.0, recommended: "none".into() },
+        );
+        (Program::new(&Evaluator::new(document)), histogram)
+    }
+
+    #[test]
+    fn channels_of_a_group_are_one_way_apart_in_all_terms() {
+        let (program, _) = program();
+        let shifts = Nodes::new(&program, 3).shifts;
+        for first in (0..program.channels.len()).step_by(TOGETHER) {
+            for (k, shift) in shifts.iter().enumerate() {
+                let Some(channel) = program.channels.get(first + k) else { continue };
+                for (t, term) in program.terms.iter().enumerate() {
+                    for axis in 0..2 {
+                        let period = (Torus::SIDE as u32) << term.levels[axis];
+                        let moved = (shift[axis] as u32) << term.levels[axis];
+                        let expected = program.channels[first].offsets[t][axis] + moved;
+                        assert_eq!(channel.offsets[t][axis], expected % period, "{k} {t} {axis}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_pieces_add_up_to_the_histogram() {
+        let (program, histogram) = program();
+        let group = &Nodes::new(&program, 3).groups[0];
+        let exact = Shape::new(&std::array::from_fn(|i| histogram[i]));
+        let shape = group.shape.as_ref().unwrap();
+        for i in -40..=40 {
+            let u = 0.1 * f64::from(i);
+            let value = |k: usize| {
+                let piece = |(knot, width, [c1, c2, c3]): &(f64, f64, [[f64; TOGETHER]; 3])| {
+                    let t = (u - knot).clamp(0.0, *width);
+                    t * (c1[k] + t * (c2[k] + t * c3[k]))
+                };
+                let straight = shape.straight.map_or(0.0, |straight| straight[k]);
+                straight * u + shape.base[k] + shape.pieces.iter().map(piece).sum::<f64>()
+            };
+            assert!((value(0) - f64::from(exact.at(u as f32))).abs() < 1e-5, "{u}");
+            assert!((value(1) - u).abs() < 1e-12, "{u}");
+        }
+    }
+}

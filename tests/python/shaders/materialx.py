@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import MaterialX
 import moderngl
 import numpy as np
+import texforge
 from MaterialX import (
     PyMaterialXGenGlsl,
     PyMaterialXGenMdl,
@@ -18,8 +19,6 @@ from MaterialX import (
     PyMaterialXGenShader,
 )
 from PIL import Image
-
-import texforge
 
 from .gl import bind, compile_glsl, context, draw, link
 from .tools import Picture, ShaderError, Texture
