@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Mapping  # noqa: TC003 (the signatures can be resolved at run time)
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -559,6 +559,122 @@ class NoiseTexture:
             )
         return np.frombuffer(values, np.float32).reshape(depth, height, width, -1)
 
+    def morph(self, other: NoiseTexture, t: float) -> NoiseTexture:
+        """Return a texture between this one and another of the same maps.
+
+        Means, weights and histograms go straight, the colours' directions turn the shortest way.
+        The noise is this texture's up to ``t=1``, which is the other itself; so with one seed,
+        values change smoothly.
+
+        Parameters
+        ----------
+        other : NoiseTexture
+            The other texture.
+        t : float
+            0 (this texture) to 1 (the other).
+
+        Returns
+        -------
+        NoiseTexture
+            The texture between.
+
+        Raises
+        ------
+        ParameterError
+            If `t` is out of range, or the textures have other maps or models (also a ValueError).
+
+        Notes
+        -----
+        Source: "Procedural Textures by Example" (2009), section 8.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import texforge
+        >>> rng = np.random.default_rng(0)
+        >>> dark, light = (
+        ...     texforge.fit_noise(rng.integers(low, low + 60, (64, 64, 3), dtype=np.uint8))
+        ...     for low in (10, 150)
+        ... )
+        >>> dark.morph(light, 0.5).render(64).mean().round(-1)
+        np.float64(110.0)
+        """
+        if not isinstance(other, NoiseTexture):
+            raise ParameterError(
+                f"`other` must be a NoiseTexture, got {type(other).__name__}",
+                fields={"name": "other"},
+            )
+        return NoiseTexture(self._core.morph(other=other._core, t=_arrays.real("t", t)))
+
+    def edit(
+        self,
+        *,
+        contrast: float = 1.0,
+        saturation: float = 1.0,
+        brightness: float = 0.0,
+        feature_size: float = 1.0,
+        histogram: Histogram = "kept",
+        gains: Sequence[float] = (),
+        means: Mapping[str, float | Sequence[float]] | None = None,
+        seed: int | None = None,
+    ) -> NoiseTexture:
+        """Return the texture with changes; the defaults change nothing.
+
+        Parameters
+        ----------
+        contrast : float
+            Factor of the contrast of all maps, 0 to 10.
+        saturation : float
+            Factor of how far colours are from grey, 0 (grey) to 10. Maps that are no colours stay.
+        brightness : float
+            What is added to colours, -1 to 1, where 1 is white.
+        feature_size : float
+            Factor of the width of features, a power of two from 0.0625 to 16. For what is between,
+            choose another `scale` when rendering.
+        histogram : {"kept", "normal"}
+            Whether the histograms are kept, or become normal distributions.
+        gains : sequence of float
+            Factors of the octaves' weights, 0 to 100, the finest first; those beyond stay.
+        means : mapping of str to float or sequence of float, optional
+            New means by the maps' names, one number or one for each channel, with full scale 1;
+            `brightness` and `saturation` do not change them.
+        seed : int, optional
+            Another seed, 0 to 2**32 - 1: the same statistics elsewhere.
+
+        Returns
+        -------
+        NoiseTexture
+            The changed texture.
+
+        Raises
+        ------
+        ParameterError
+            If an argument is out of range, there are more gains than octaves, a mean is of no map,
+            or no band would be left (also a ValueError).
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import texforge
+        >>> photo = np.random.default_rng(0).integers(0, 256, (64, 64, 3), dtype=np.uint8)
+        >>> texture = texforge.fit_noise(photo)
+        >>> grey = texture.edit(saturation=0, contrast=0.5, means={"basecolor": 0.4})
+        >>> grey.document["mean"]
+        [0.4, 0.4, 0.4]
+        """
+        values = dict(locals())
+        texts = [
+            (param["name"], _api.parameter_text(param, values[param["name"]]))
+            for param in _texforge.schema("edit")
+        ]
+        core = self._core.edit(
+            params=texts,
+            gains=_reals("gains", gains),
+            means=[(name, _reals("means", mean)) for name, mean in _items("means", means)],
+            seed=None if seed is None else _arrays.integer("seed", seed, 0, 2**32 - 1),
+        )
+        return NoiseTexture(core)
+
     def __eq__(self, other: object) -> bool:
         """Compare the documents."""
         if not isinstance(other, NoiseTexture):
@@ -598,6 +714,28 @@ def _image(parts: tuple[bytearray, str, tuple[int, int, int], str]) -> Image:
 
 def _threads(threads: int | None) -> int:
     return _arrays.integer("threads", threads or 0, high=1024)
+
+
+def _reals(name: str, value: Any) -> list[float]:
+    """Return a number, or any number of them."""
+    if isinstance(value, str | bytes | Mapping):
+        raise ParameterError(f"`{name}` must be numbers, got {value!r}", fields={"name": name})
+    try:
+        values = list(value)
+    except TypeError:
+        values = [value]
+    return [_arrays.real(name, one) for one in values]
+
+
+def _items(name: str, value: Any) -> list[tuple[str, Any]]:
+    """Return what a mapping has by name; nothing of None."""
+    if value is None:
+        return []
+    if not isinstance(value, Mapping) or not all(isinstance(key, str) for key in value):
+        raise ParameterError(
+            f"`{name}` must be a mapping with names as keys, got {value!r}", fields={"name": name}
+        )
+    return list(value.items())
 
 
 def _several(name: str, value: Any, count: int, expected: str) -> list[Any]:

@@ -88,6 +88,15 @@ class Noise:
         threads: int,
         progress: Callable[[float], object] | None,
     ) -> list[tuple[str, _PictureOut]]: ...
+    def morph(self, *, other: Noise, t: float) -> Noise: ...
+    def edit(
+        self,
+        *,
+        params: list[tuple[str, str]],
+        gains: list[float],
+        means: list[tuple[str, list[float]]],
+        seed: int | None,
+    ) -> Noise: ...
 
 def fit_noise(
     *,

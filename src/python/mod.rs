@@ -32,7 +32,7 @@ use crate::image::sigma_map::SigmaMap;
 use crate::verb::extract::ExtractParams;
 use crate::verb::inputs::Inputs;
 use crate::verb::lattice::{Lattice, LatticeParams, detect_lattice, lattice_autocorrelation};
-use crate::verb::noise::NoiseParams;
+use crate::verb::noise::{NoiseEditParams, NoiseParams};
 use crate::verb::params::TileParams;
 use crate::verb::redo::Redo;
 use crate::verb::regular::RegularParams;
@@ -363,7 +363,7 @@ fn map_kind(name: &str) -> String {
 }
 
 /// Every parameter of a Python function (`texture_cost`, `detect_lattice`, `extract`, `regular`,
-/// `fit_noise`, else `tile`), with its default as text.
+/// `fit_noise`, `edit` of a procedural texture, else `tile`), with its default as text.
 #[pyfunction]
 #[pyo3(signature = (verb = "tile"))]
 fn schema<'py>(py: Python<'py>, verb: &str) -> PyResult<Vec<Bound<'py, PyDict>>> {
@@ -384,6 +384,7 @@ fn schema<'py>(py: Python<'py>, verb: &str) -> PyResult<Vec<Bound<'py, PyDict>>>
         ExtractParams::VERB => ExtractParams::schema(),
         RegularParams::VERB => RegularParams::schema(),
         "fit_noise" => NoiseParams::schema(),
+        "edit" => NoiseEditParams::schema(),
         _ => TileParams::schema(),
     };
     params.into_iter().map(entry).collect()

@@ -13,7 +13,9 @@ use crate::method::noise::Filter;
 use crate::python::array::{ArrayIn, ArrayOut, array_out, bytes_out, copied};
 use crate::python::error::IntoPy as _;
 use crate::python::{enter, kind_named, mask_of};
-use crate::verb::noise::{self, NamedMap, NoiseParams, NoiseTexture, RenderParams, SampleType};
+use crate::verb::noise::{
+    self, NamedMap, NoiseEdit, NoiseParams, NoiseTexture, RenderParams, SampleType,
+};
 
 /// A map to fit: its name, its samples, what its numbers are.
 type MapIn<'py> = (String, ArrayIn<'py>, String);
@@ -192,6 +194,31 @@ impl Noise {
             .filter(|(name, ..)| only.is_none_or(|only| only == name))
             .map(|(name, _, picture)| Ok((name.clone(), array_out(py, picture)?)))
             .collect()
+    }
+
+    /// The texture between this and another.
+    #[pyo3(signature = (*, other, t))]
+    fn morph(&self, py: Python<'_>, other: &Self, t: f64) -> PyResult<Self> {
+        let (texture, other) = (self.0.clone(), other.0.clone());
+        enter::unheard(py, move || texture.morph(&other, t)).map(Self)
+    }
+
+    /// The texture with changes.
+    #[pyo3(signature = (*, params, gains, means, seed))]
+    fn edit(
+        &self,
+        py: Python<'_>,
+        params: Vec<(String, String)>,
+        gains: Vec<f64>,
+        means: Vec<(String, Vec<f64>)>,
+        seed: Option<u32>,
+    ) -> PyResult<Self> {
+        let mut edit = NoiseEdit { gains, means, seed, ..NoiseEdit::default() };
+        for (name, text) in &params {
+            edit.params.set(name, text).into_py(py)?;
+        }
+        let texture = self.0.clone();
+        enter::unheard(py, move || texture.edit(&edit)).map(Self)
     }
 }
 

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 Array: TypeAlias = "npt.NDArray[np.float64]"
 Kind: TypeAlias = tuple[str, ...]
-"""Which frequencies a band has: ``("square",)``, ``("round",)``, ``("round-fine",)`` or the parts along
-both axes of oriented noise."""
+"""Which frequencies a band has: ``("square",)``, ``("round",)``, ``("round-fine",)`` or the parts
+along both axes of oriented noise."""
 
 SIDE, SOLID_SIDE = 256, 64
 KNOTS = np.array([-3.2, -2.3, -1.6, -1.0, -0.5, 0.0, 0.5, 1.0, 1.6, 2.3, 3.2])
@@ -202,7 +202,9 @@ def noise_at(kind: Kind, places: Array) -> Array:
     for steps in itertools.product((-1, 0, 1), repeat=axes):
         index = middle + steps
         weight = bspline(places - index).prod(axis=-1)
-        total += weight * torus[tuple(index[..., i] % torus.shape[0] for i in reversed(range(axes)))]
+        total += (
+            weight * torus[tuple(index[..., i] % torus.shape[0] for i in reversed(range(axes)))]
+        )
     return total
 
 
@@ -226,7 +228,7 @@ def projected_at(kind: Kind, places: Array, normals: Array) -> Array:
 
 @functools.cache
 def projected_deviation(kind: Kind) -> float:
-    counters = 5 * np.arange(4096, dtype=np.uint32)[:, None] + np.arange(5, dtype=np.uint32)
+    counters = np.arange(5 * 4096, dtype=np.uint32).reshape(-1, 5)
     numbers = (mixed(counters) >> np.uint32(8)) / 2**24
     z, angle = 2 * numbers[:, 3] - 1, 2 * np.pi * numbers[:, 4]
     r = np.sqrt(1 - z**2)
@@ -239,13 +241,13 @@ def histogram_at(values: list[float], u: Array) -> Array:
     v = np.array(values)
     secants = np.diff(v) / np.diff(KNOTS)
     slopes = np.concatenate([secants[:1], (secants[:-1] + secants[1:]) / 2, secants[-1:]])
-    for i, secant in enumerate(secants):
+    for k, secant in enumerate(secants):
         if secant <= 0:
-            slopes[i : i + 2] = 0
+            slopes[k : k + 2] = 0
             continue
-        length = np.hypot(slopes[i] / secant, slopes[i + 1] / secant)
+        length = np.hypot(slopes[k] / secant, slopes[k + 1] / secant)
         if length > 3:
-            slopes[i : i + 2] *= 3 / length
+            slopes[k : k + 2] *= 3 / length
     u = np.clip(u, KNOTS[0], KNOTS[-1])
     i = np.clip(np.searchsorted(KNOTS, u, side="right") - 1, 0, len(secants) - 1)
     h = KNOTS[i + 1] - KNOTS[i]
@@ -326,9 +328,9 @@ def values_at(
             u = noise / math.sqrt(whole) if whole > 0 else noise * 0
             side = math.sqrt(3 * lost / whole) if whole > 0 else 0.0
             # Gauss-Hermite quadrature over what was taken away.
-            noise = sum(
-                w * histogram_at(channel["histogram"], u + s)
-                for s, w in ((-side, 1 / 6), (0.0, 2 / 3), (side, 1 / 6))
+            below, here, above = (
+                histogram_at(channel["histogram"], u + s) for s in (-side, 0.0, side)
             )
+            noise = (below + 4 * here + above) / 6
         out += np.outer(noise, np.array(document["matrix"])[:, c])
     return out

@@ -16,11 +16,13 @@ PUBLIC = [getattr(texforge, name) for name in texforge.__all__]
 
 
 @pytest.mark.parametrize(
-    "function", [thing for thing in PUBLIC if inspect.isfunction(thing)], ids=lambda f: f.__name__
+    "thing",
+    [thing for thing in PUBLIC if inspect.isfunction(thing) or inspect.isclass(thing)],
+    ids=lambda thing: thing.__name__,
 )
-def test_examples_in_docstrings(function: object) -> None:
-    finder = doctest.DocTestFinder(recurse=False)
-    for test in finder.find(function, getattr(function, "__name__", "")):
+def test_examples_in_docstrings(thing: object) -> None:
+    # Of a class also its methods'.
+    for test in doctest.DocTestFinder().find(thing, getattr(thing, "__name__", "")):
         results = doctest.DocTestRunner().run(test)
         assert results.failed == 0
 

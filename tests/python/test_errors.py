@@ -23,6 +23,7 @@ CLASSES: dict[str, tuple[type[texforge.TexforgeError], type[Exception]]] = {
     "size_mismatch": (texforge.PictureError, ValueError),
     "bad_picture": (texforge.PictureError, ValueError),
     "no_structure": (texforge.NoStructureError, ValueError),
+    "document": (texforge.DocumentError, ValueError),
     "memory": (texforge.OutOfMemory, MemoryError),
     "decode": (texforge.ReadError, OSError),
     "format": (texforge.FormatError, OSError),

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import copy
+import itertools
 import json
 import pickle
+import statistics
 from typing import TYPE_CHECKING, Any
 
 import hypothesis
@@ -193,15 +195,16 @@ def test_integers_are_the_clipped_floats(material: texforge.NoiseTexture) -> Non
     floats = wild.render_maps(100, dtype="float32")
     assert floats["basecolor"].max() > 1
     assert floats["basecolor"].min() < 0
-    for dtype in ("uint8", "uint16"):
+    dtypes: tuple[texforge.SampleType, ...] = ("uint8", "uint16")
+    for dtype in dtypes:
         full = np.iinfo(dtype).max
-        pictures = wild.render_maps(100, dtype=dtype)  # type: ignore[arg-type]
+        pictures = wild.render_maps(100, dtype=dtype)
         assert list(pictures) == ["basecolor", "height", "normal_gl"]
         for name, picture in pictures.items():
             assert picture.dtype == dtype
             expected = np.clip(np.asarray(floats[name], float), 0, 1) * full
             assert np.abs(np.asarray(picture, float) - expected).max() <= 0.5 + 1e-6 * full
-            again = wild.render(100, map=name, dtype=dtype)  # type: ignore[arg-type]
+            again = wild.render(100, map=name, dtype=dtype)
             assert np.array_equal(picture, again)
 
 
@@ -416,9 +419,7 @@ def test_tileable_pictures_repeat(sand: texforge.NoiseTexture, scale: float) -> 
 def test_values_are_those_of_the_naive_twin(
     seed: int, bands: Any, histogram: Any, footprint: float, keep_contrast: bool, far: float
 ) -> None:
-    texture = texforge.fit_noise(
-        grain(seed=seed % 3), bands=bands, histogram=histogram, seed=seed
-    )
+    texture = texforge.fit_noise(grain(seed=seed % 3), bands=bands, histogram=histogram, seed=seed)
     points = np.random.default_rng(seed).uniform(-far, far, (200, 2))
     given: dict[str, Any] = {"footprint": footprint, "keep_contrast": keep_contrast}
     expected = naive_noise.values_at(texture.document, points, **given)
@@ -498,6 +499,95 @@ def test_progress_and_cancelling(sand: texforge.NoiseTexture) -> None:
             call(lambda _: False)
 
 
+def test_morphing(sand: texforge.NoiseTexture) -> None:
+    other = texforge.fit_noise(255 - grain(48, 96, seed=5), seed=3)
+    assert sand.morph(other, 0) == sand
+    assert sand.morph(other, 1) == other
+    half = sand.morph(other, 0.5)
+    means = np.add(sand.document["mean"], other.document["mean"]) / 2
+    assert half.document["mean"] == pytest.approx(means, abs=1e-5)
+    assert half.size == (56, 88)
+    points = np.random.default_rng(0).uniform(-100, 100, (500, 2))
+    steps = [sand.morph(other, t).at(points) for t in np.linspace(0, 0.99, 12)]
+    moved = [float(np.abs(b - a).mean()) for a, b in itertools.pairwise(steps)]
+    # Evenly: no step is a jump.
+    assert max(moved) < 2 * statistics.median(moved)
+    with pytest.raises(texforge.ParameterError, match="other"):
+        sand.morph(texforge.fit_noise(grain(channels=None)), 0.5)
+    with pytest.raises(texforge.ParameterError, match="other"):
+        sand.morph(sand.to_json(), 0.5)  # type: ignore[arg-type]
+    for t in (-0.1, 1.1, np.nan, "half", None):
+        with pytest.raises(texforge.ParameterError, match=r"^`t` must be .+, got "):
+            sand.morph(other, t)  # type: ignore[arg-type]
+
+
+def test_editing(material: texforge.NoiseTexture) -> None:
+    assert material.edit() == material
+    assert material.edit(seed=9).seed == 9
+    assert material.edit(seed=9).edit(seed=0) == material
+
+    def rendered(texture: texforge.NoiseTexture, **options: Any) -> npt.NDArray[np.float64]:
+        return np.asarray(texture.render(256, dtype="float32", **options), float)
+
+    plain = rendered(material)
+    softer = rendered(material.edit(contrast=0.5))
+    middle = np.array(material.document["mean"][:3])
+    assert softer == pytest.approx(middle + 0.5 * (plain - middle), abs=1e-5)
+    grey = rendered(material.edit(saturation=0))
+    assert np.ptp(grey, axis=2).max() < 1e-4
+    assert rendered(material.edit(brightness=0.25)) == pytest.approx(plain + 0.25, abs=1e-5)
+    height = rendered(material.edit(saturation=0, brightness=0.25), map="height")
+    assert np.array_equal(height, rendered(material, map="height"))
+    moved = material.edit(means={"height": 0.125, "basecolor": [0.5, 0.25, 0.75]})
+    assert moved.document["mean"][:4] == [0.5, 0.25, 0.75, 0.125]
+    without = rendered(material.edit(gains=[0, 0]))
+    assert np.abs(np.diff(without, axis=1)).mean() < 0.5 * np.abs(np.diff(plain, axis=1)).mean()
+    wide = material.edit(feature_size=2)
+    weights = [d.document["model"]["wavelet"]["channels"][0]["weights"] for d in (wide, material)]
+    assert len(weights[0]) == len(weights[1]) + 1
+    assert "histogram" not in material.edit(histogram="normal").to_json()
+
+
+BAD_EDITS: dict[str, dict[str, Any]] = {
+    "contrast": {"contrast": -1},
+    "contrast nan": {"contrast": np.nan},
+    "saturation": {"saturation": 11},
+    "brightness": {"brightness": "dark"},
+    "feature size": {"feature_size": 3},
+    "feature size zero": {"feature_size": 0},
+    "histogram": {"histogram": "flat"},
+    "gain negative": {"gains": [-1]},
+    "gain nan": {"gains": [np.nan]},
+    "gains text": {"gains": "12"},
+    "more gains than octaves": {"gains": [1] * 20},
+    "mean of no map": {"means": {"roughness": 0.5}},
+    "mean nan": {"means": {"height": np.nan}},
+    "mean of two": {"means": {"basecolor": (0.5, 0.5)}},
+    "means of no names": {"means": {3: 0.5}},
+    "means a list": {"means": [0.5]},
+    "mean text": {"means": {"height": "half"}},
+    "seed": {"seed": 2**32},
+    "seed text": {"seed": "a"},
+}
+
+
+@pytest.mark.parametrize("case", BAD_EDITS)
+def test_bad_edits(material: texforge.NoiseTexture, case: str) -> None:
+    with pytest.raises(texforge.ParameterError, match=r"^`\w+` must be .+, got ") as caught:
+        material.edit(**BAD_EDITS[case])
+    assert "\n" not in str(caught.value)
+
+
+def test_what_was_edited_again_and_again_can_be_kept(sand: texforge.NoiseTexture) -> None:
+    texture = sand
+    for _ in range(12):
+        try:
+            texture = texture.edit(contrast=10, saturation=10, gains=[100])
+        except texforge.ParameterError:
+            break
+        assert pickle.loads(pickle.dumps(texture)) == texture  # noqa: S301 (our own)
+
+
 BAD_FITS: dict[str, dict[str, Any]] = {
     "bands": {"bands": "hexagonal"},
     "weights": {"weights": None},
@@ -556,7 +646,7 @@ def test_masks_and_maps_that_do_not_fit() -> None:
         ({"maps": {"height": "height.png"}}, "bad_picture"),
     ):
         with pytest.raises(texforge.PictureError) as caught:
-            texforge.fit_noise(photo, **options)  # type: ignore[arg-type]
+            texforge.fit_noise(photo, **options)
         assert caught.value.kind == kind
         assert "\n" not in str(caught.value)
 
@@ -669,7 +759,7 @@ def changed(path: tuple[str | int, ...], value: Any) -> Callable[[dict[str, Any]
 
 
 INNER = ("model", "wavelet")
-DAMAGE: dict[str, Callable[[dict[str, Any]], None]] = {
+DAMAGE: dict[str, Callable[[dict[str, Any]], object]] = {
     "a later version": changed(("version",), 2),
     "version 0": changed(("version",), 0),
     "version text": changed(("version",), "1"),
@@ -758,9 +848,10 @@ def test_cut_and_garbled_documents_never_panic(
 
 
 def test_arguments_that_are_no_text(tmp_path: Path) -> None:
-    for text in (None, 3, b"{}", {}, tmp_path):
+    wrong: tuple[Any, ...] = (None, 3, b"{}", {}, tmp_path)
+    for text in wrong:
         with pytest.raises(texforge.ParameterError, match="text"):
-            texforge.NoiseTexture.from_json(text)  # type: ignore[arg-type]
+            texforge.NoiseTexture.from_json(text)
 
 
 def test_the_words_of_the_core_are_those_of_the_types() -> None:

@@ -115,4 +115,4 @@ def test_textures_have_the_statistics_of_photographs() -> None:
 
 
 if __name__ == "__main__":
-    print(report())  # noqa: T201
+    print(report())

@@ -16,6 +16,8 @@ FUNCTIONS = [
     texforge.detect_lattice,
     texforge.extract,
     texforge.regular,
+    texforge.fit_noise,
+    texforge.NoiseTexture.edit,
 ]
 
 
@@ -36,7 +38,16 @@ def test_names_order_and_defaults_are_those_of_the_core(function: Callable[..., 
             assert entry["default"] == str(shown)
 
 
-@pytest.mark.parametrize("function", [texforge.tile, texforge.regular, texforge.extract])
+@pytest.mark.parametrize(
+    "function",
+    [
+        texforge.tile,
+        texforge.regular,
+        texforge.extract,
+        texforge.fit_noise,
+        texforge.NoiseTexture.edit,
+    ],
+)
 def test_the_words_accepted_are_those_of_the_core(function: Callable[..., object]) -> None:
     hints = typing.get_type_hints(function)
     schema = _texforge.schema(function.__name__)
@@ -54,6 +65,13 @@ def test_everything_but_the_picture_is_keyword_only() -> None:
         texforge.detect_lattice,
         texforge.extract,
         texforge.regular,
+        texforge.fit_noise,
+        texforge.NoiseTexture.at,
+        texforge.NoiseTexture.edit,
+        texforge.NoiseTexture.render,
+        texforge.NoiseTexture.render_maps,
+        texforge.NoiseTexture.save,
+        texforge.NoiseTexture.solid,
         texforge.read_image,
         texforge.write_image,
     ):
@@ -66,7 +84,7 @@ def test_everything_but_the_picture_is_keyword_only() -> None:
 def test_every_parameter_is_documented(function: Callable[..., object]) -> None:
     doc = inspect.getdoc(function)
     assert doc is not None
-    for name in inspect.signature(function).parameters:
+    for name in inspect.signature(function).parameters.keys() - {"self"}:
         assert f"\n{name} : " in doc
 
 

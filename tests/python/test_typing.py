@@ -53,18 +53,40 @@ def test_a_near_regular_texture() -> None:
     texforge.regular(photo, lattice="none", seam="cut", maps={"height": photo}, straighten="off")
 
 
+def test_a_procedural_texture(tmp_path: Path) -> None:
+    photo = np.random.default_rng(0).integers(0, 256, (32, 40, 3), dtype=np.uint8)
+    texture = texforge.fit_noise(photo, bands="square", maps={"height": photo[..., 0]})
+    assert_type(texture, texforge.NoiseTexture)
+    assert_type(texture.at([[1, 2]]), npt.NDArray[np.float32])
+    assert_type(
+        texture.at(np.zeros((4, 3), np.float32), normals=(0, 0, 1)), npt.NDArray[np.float32]
+    )
+    assert_type(texture.render(16), texforge.Image)
+    assert_type(texture.render((16, 8), dtype="float32", map="height"), texforge.Image)
+    assert_type(texture.render_maps(16, tileable=True), dict[str, texforge.Image])
+    assert_type(texture.solid((1, 2, 3)), npt.NDArray[np.float32])
+    assert_type(texture.channels, dict[str, slice])
+    assert_type(texture.size, tuple[int, int])
+    texture.save(tmp_path / "texture.json")
+    assert_type(texforge.NoiseTexture.load(tmp_path / "texture.json"), texforge.NoiseTexture)
+    edited = texture.edit(contrast=0.5, gains=[0, 1.5], means={"height": 0.5}, seed=3)
+    assert_type(edited.morph(texture, 0.25), texforge.NoiseTexture)
+
+
 def test_wrong_words_are_type_errors(photo: npt.NDArray[np.uint8]) -> None:
     # mypy complains about an ignore that is not needed: each line proves that it objects.
     wrong: list[texforge.TexforgeError] = []
-    calls: tuple[Callable[[], texforge.Tile], ...] = (
+    calls: tuple[Callable[[], object], ...] = (
         lambda: texforge.tile(photo, axis="z"),  # type: ignore[arg-type]
         lambda: texforge.tile(photo, quality="fast"),  # type: ignore[arg-type]
         lambda: texforge.tile(photo, size="64"),  # type: ignore[arg-type]
         lambda: texforge.tile(photo, progress=3),  # type: ignore[arg-type]
+        lambda: texforge.fit_noise(photo, bands="hexagonal"),  # type: ignore[arg-type]
+        lambda: texforge.fit_noise(photo).render(8, dtype="int8"),  # type: ignore[arg-type]
     )
     for call in calls:
         try:
             call()
         except texforge.ParameterError as error:
             wrong.append(error)
-    assert len(wrong) == 4
+    assert len(wrong) == 6

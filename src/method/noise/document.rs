@@ -279,7 +279,7 @@ impl Document {
     }
 
     /// Checks all that reading it does not.
-    fn validate(&self) -> Result<()> {
+    pub(crate) fn validate(&self) -> Result<()> {
         let bad = |reason: String| Err(Error::Document { reason });
         let channels: usize = self.maps.iter().fold(0, |sum, map| sum.saturating_add(map.channels));
         if !(1..=MOST_CHANNELS).contains(&channels) || self.maps.iter().any(|map| map.channels == 0)

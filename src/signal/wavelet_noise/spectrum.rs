@@ -14,9 +14,19 @@ use crate::signal::power::window;
 /// first `rows / 2 + 1` frequencies of y by the first `cols / 2 + 1` of x. Frequencies below zero have the
 /// same.
 pub fn expected(detail: Detail, levels: [u32; 2], (rows, cols): (usize, usize)) -> Vec<f64> {
-    let (across, down) = (Axis::new(detail, levels[0], cols), Axis::new(detail, levels[1], rows));
+    let axes = [Axis::new(detail, levels[0], cols), Axis::new(detail, levels[1], rows)];
+    let mut power = unwindowed(detail, &axes);
+    let [across, down] = &axes;
+    power.par_chunks_mut(across.transfer.len()).for_each(|line| across.blur(line));
+    let mut columns = transposed(&power, across.transfer.len());
+    columns.par_chunks_mut(down.transfer.len()).for_each(|line| down.blur(line));
+    transposed(&columns, down.transfer.len())
+}
+
+/// The same before the window.
+fn unwindowed(detail: Detail, [across, down]: &[Axis; 2]) -> Vec<f64> {
     let width = across.transfer.len();
-    let scale = 1.0 / (continuous(detail) * (rows * cols) as f64);
+    let scale = 1.0 / (continuous(detail) * (down.n * across.n) as f64);
     let mut power = vec![0.0; width * down.transfer.len()];
     power.par_chunks_mut(width).zip(&down.transfer).for_each(|(line, &(fy, ty))| {
         for (power, &(fx, tx)) in line.iter_mut().zip(&across.transfer) {
@@ -27,10 +37,7 @@ pub fn expected(detail: Detail, levels: [u32; 2], (rows, cols): (usize, usize)) 
             }
         }
     });
-    power.par_chunks_mut(width).for_each(|line| across.blur(line));
-    let mut columns = transposed(&power, width);
-    columns.par_chunks_mut(down.transfer.len()).for_each(|line| down.blur(line));
-    transposed(&columns, down.transfer.len())
+    power
 }
 
 fn transposed(plane: &[f64], width: usize) -> Vec<f64> {
@@ -125,8 +132,11 @@ pub fn at_pixels(detail: Detail, levels: [u32; 2]) -> f64 {
     const N: usize = 96;
     // From four pixels to a coefficient on all are alike, and so many coefficients tell all.
     let levels = levels.map(|level| level.min(2));
-    let power = expected(detail, levels, (N << levels[1], N << levels[0]));
-    sum_both_signs(&power, (N << levels[1], N << levels[0]), |_, _| true)
+    let [cols, rows] = levels.map(|level| N << level);
+    let axes = [Axis::new(detail, levels[0], cols), Axis::new(detail, levels[1], rows)];
+    // A part of the format: the analysis' window must not matter.
+    let power = unwindowed(detail, &axes);
+    sum_both_signs(&power, (rows, cols), |_, _| true)
 }
 
 /// How many frequencies of a transform of `n` samples the `k`th stands for: its negative one too.

@@ -59,7 +59,7 @@ impl NoiseTexture {
     /// # Errors
     /// [`Error::Parameter`] for a number out of range, more gains than the texture has octaves, a mean
     /// for a map that it has not or with another number of channels, and a feature size that is no power of
-    /// two, or leaves no band that a texture can have.
+    /// two, or leaves no band that a texture can have, and numbers that leave a document's range.
     pub fn edit(&self, edit: &NoiseEdit) -> Result<Self> {
         let params = &edit.params;
         params.validate()?;
@@ -74,7 +74,13 @@ impl NoiseTexture {
         document.brighten(f64::from(params.brightness));
         edit.means.iter().try_for_each(|(map, mean)| set_mean(&mut document, map, mean))?;
         document.seed = edit.seed.unwrap_or(document.seed);
-        Ok(Self::new(document.rounded()))
+        let document = document.rounded();
+        // It must be possible to read what is written.
+        document.validate().map_err(|_| {
+            let expected = "less, after what was edited before: numbers leave a texture's range";
+            Error::parameter("contrast", expected, params.contrast)
+        })?;
+        Ok(Self::new(document))
     }
 }
 
