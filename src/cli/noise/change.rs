@@ -8,11 +8,12 @@ use serde_json::{Value, json};
 
 use super::{about, document, output, path, read, shown, target, write};
 use crate::base::error::{Error, Result};
+use crate::cli::args;
 use crate::cli::output::Target;
 use crate::cli::small::{SCHEMA_VERSION, print_json};
 use crate::cli::summary::typed_params;
 use crate::cli::work::{Session, supervise, watch_signals};
-use crate::cli::{args, files};
+use crate::image::io::check_place;
 use crate::verb::noise::{NoiseEdit, NoiseEditParams, NoiseTexture};
 
 const MORPH_EXAMPLES: &str = "\
@@ -148,7 +149,7 @@ fn run(
     let summary = supervise(&session, move |session| {
         if let Some(path) = output.file() {
             let inputs: Vec<_> = inputs.iter().map(PathBuf::as_path).collect();
-            files::check_place(path, &inputs, force)?;
+            check_place(path, &inputs, force)?;
         }
         let textures = inputs.iter().map(|path| read(path)).collect::<Result<Vec<_>>>()?;
         let texture = change(&textures)?;

@@ -17,6 +17,7 @@ use crate::cli::sources::Sources;
 use crate::cli::summary::{Seconds, Written, typed_params};
 use crate::cli::work::{Session, supervise};
 use crate::cli::{args, files};
+use crate::image::io::check_place;
 use crate::image::mask::Mask;
 use crate::image::material::MapKind;
 use crate::verb::noise::{NamedMap, NoiseParams, fit_noise};
@@ -81,7 +82,7 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<serde_json::V
         let mut inputs: Vec<&Path> = vec![&request.photo];
         inputs.extend(request.mask.iter().map(PathBuf::as_path));
         inputs.extend(request.maps.iter().flat_map(|m| &m.paths).map(PathBuf::as_path));
-        files::check_place(path, &inputs, request.force)?;
+        check_place(path, &inputs, request.force)?;
     }
     let photo = files::read(&request.photo, MapKind::Color)?;
     let mut notes = photo.meta.notes.clone();

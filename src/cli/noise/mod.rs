@@ -1,6 +1,7 @@
 //! `texforge noise`: procedural textures by example.
 
 mod change;
+mod export;
 mod fit;
 mod render;
 mod sheet;
@@ -34,6 +35,7 @@ pub(super) fn command() -> Command {
         .subcommand(change::morph_command())
         .subcommand(change::edit_command())
         .subcommand(sheet::command())
+        .subcommand(export::command())
 }
 
 /// Runs `texforge noise`.
@@ -47,6 +49,7 @@ pub(super) fn run(matches: &ArgMatches) -> Result<()> {
         Some(("morph", matches)) => change::morph(matches),
         Some(("edit", matches)) => change::edit(matches),
         Some(("sheet", matches)) => sheet::run(matches),
+        Some(("export", matches)) => export::run(matches),
         _ => Err(Error::Internal { message: "a command of noise is not connected".into() }),
     }
 }
