@@ -47,7 +47,7 @@ pub use verb::inputs::Inputs;
 pub use verb::lattice::{Lattice, LatticeParams, detect_lattice, lattice_autocorrelation};
 pub use verb::noise::{
     NamedMap, NoiseEdit, NoiseEditParams, NoiseParams, NoiseReport, NoiseTexture, RenderParams,
-    SampleType, fit_noise,
+    RenderedMap, SampleType, fit_noise,
 };
 pub use verb::palette::{Palette, palette};
 pub use verb::params::{Axis, Follow, Measure, Method, Quality, Size, Symmetries, TileParams};

@@ -8,7 +8,7 @@ use clap::{Arg, ArgAction, ArgMatches, Command, ValueHint, value_parser};
 use crate::base::params::{Param, Value as _};
 use crate::cli::small::SCHEMAS;
 use crate::cli::sources::Sources;
-use crate::cli::{extract, maps, palette, regular, study};
+use crate::cli::{extract, maps, noise, palette, regular, study};
 use crate::image::material::MapKind;
 use crate::verb::lattice::LatticeParams;
 use crate::verb::params::TileParams;
@@ -59,6 +59,7 @@ pub(super) fn command() -> Command {
         .subcommand(tile())
         .subcommand(palette::command())
         .subcommand(regular::command())
+        .subcommand(noise::command())
         .subcommand(extract::command())
         .subcommand(apply())
         .subcommand(lattice())
@@ -104,7 +105,7 @@ pub(super) fn command() -> Command {
                 .arg(
                     Arg::new("verb")
                         .value_name("COMMAND")
-                        .value_parser(["tile", "palette", "regular", "extract", "apply", "lattice", "study", "params", "info", "completions"])
+                        .value_parser(["tile", "palette", "regular", "noise", "extract", "apply", "lattice", "study", "params", "info", "completions"])
                         .help("The page of this command"),
                 ),
         )
@@ -167,26 +168,26 @@ fn tile() -> Command {
 
 /// What any command that makes pictures by chance can be told about its outputs and its run.
 pub(super) fn usual(command: Command) -> Command {
+    let seed = Arg::new("seed")
+        .long("seed")
+        .value_name("N")
+        .default_value("0")
+        .value_parser(value_parser!(u64))
+        .allow_negative_numbers(true)
+        .help("Seed of all random choices; the same seed gives the same pixels on any machine");
+    // The seed first.
+    without_chance(command.next_help_heading("Running").arg(seed))
+}
+
+/// The same for a command that leaves nothing to chance.
+pub(super) fn without_chance(command: Command) -> Command {
     command
         .next_help_heading("Outputs")
         .arg(switch("force", "Overwrite outputs that exist already"))
         .arg(json())
         .arg(switch("quiet", "Say nothing but errors").short('q'))
         .next_help_heading("Running")
-        .args(running())
-}
-
-fn running() -> [Arg; 2] {
-    [
-        Arg::new("seed")
-            .long("seed")
-            .value_name("N")
-            .default_value("0")
-            .value_parser(value_parser!(u64))
-            .allow_negative_numbers(true)
-            .help("Seed of all random choices; the same seed gives the same pixels on any machine"),
-        threads(),
-    ]
+        .arg(threads())
 }
 
 /// What makes one rectangle of a tile anew.
@@ -241,7 +242,7 @@ fn apply() -> Command {
 }
 
 fn lattice() -> Command {
-    Command::new(LatticeParams::VERB)
+    let command = Command::new(LatticeParams::VERB)
         .about("Finds by which displacements a photo of bricks, tiles or cloth repeats.")
         .before_help(LATTICE_EXAMPLES)
         .arg(Sources::photo())
@@ -263,12 +264,8 @@ fn lattice() -> Command {
                  EXR holds it as it is (-1 to 1), other formats as grey, 0 at half",
             )
             .long("autocorrelation"),
-        )
-        .arg(switch("force", "Overwrite outputs that exist already"))
-        .arg(json())
-        .arg(switch("quiet", "Say nothing but errors").short('q'))
-        .next_help_heading("Running")
-        .arg(threads())
+        );
+    without_chance(command)
 }
 
 fn threads() -> Arg {
@@ -339,8 +336,10 @@ pub(super) fn json() -> Arg {
 
 /// The long flags of a command, for hints.
 pub(super) fn flags_of(command: &str) -> Vec<String> {
-    self::command()
-        .find_subcommand(command)
+    let mut all = self::command();
+    command
+        .split(' ')
+        .try_fold(&mut all, |command, name| command.find_subcommand_mut(name))
         .map(|c| c.get_arguments().filter_map(|a| a.get_long().map(str::to_owned)).collect())
         .unwrap_or_default()
 }
@@ -370,9 +369,12 @@ mod tests {
         for param in TileParams::schema() {
             assert!(flags.contains(&param.name.replace('_', "-")), "{}", param.name);
         }
-        for sub in command().get_subcommands_mut() {
+        let mut all = command();
+        let mut waiting: Vec<_> = all.get_subcommands_mut().collect();
+        while let Some(sub) = waiting.pop() {
             let help = sub.render_long_help().to_string();
             assert!(help.starts_with("Examples:"), "{help}");
+            waiting.extend(sub.get_subcommands_mut());
         }
     }
 

@@ -10,12 +10,14 @@ mod extract;
 mod files;
 mod lattice;
 mod maps;
+mod noise;
 mod output;
 mod palette;
 mod regular;
 mod show;
 mod small;
 mod sources;
+mod strips;
 pub mod study;
 mod summary;
 mod tile;
@@ -40,13 +42,19 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
     let Some((command, matches)) = matches.subcommand() else {
         return exit::USAGE;
     };
-    let result = match command {
+    let mut command = command.to_owned();
+    let result = match command.as_str() {
         "tile" => tile::run(matches),
         "palette" => palette::run(matches),
         "extract" => extract::run(matches),
         "apply" => apply::run(matches),
         "lattice" => lattice::run(matches),
         "regular" => regular::run(matches),
+        "noise" => {
+            // Errors are told of the command that was typed.
+            command.extend(matches.subcommand_name().map(|name| format!(" {name}")));
+            noise::run(matches)
+        }
         "params" => small::params(matches),
         "info" => small::info(matches),
         "completions" => small::completions(matches),
@@ -58,7 +66,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
         Ok(()) => exit::DONE,
         Err(error) => {
             if !exit::is_broken_pipe(&error) {
-                tell(&error, command);
+                tell(&error, &command);
             }
             exit::status(&error)
         }

@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
-use std::sync::mpsc;
 use std::time::Instant;
 
 use clap::{ArgMatches, Command};
@@ -16,10 +15,11 @@ use crate::cli::output::{Target, to_stdout};
 use crate::cli::show::duration;
 use crate::cli::small::{SCHEMA_VERSION, print_json};
 use crate::cli::sources::Sources;
+use crate::cli::strips::{self, STRIP_PIXELS};
 use crate::cli::summary::{Seconds, Written, record_of, typed_params};
 use crate::cli::work::{Session, supervise};
 use crate::cli::{args, files};
-use crate::image::io::{Format, WriteOptions, write_rows};
+use crate::image::io::{Format, WriteOptions};
 use crate::image::mask::Mask;
 use crate::image::material::MapKind;
 use crate::image::picture::Picture;
@@ -36,9 +36,6 @@ Examples:
   texforge regular scan.png -o wall.png --size 2048 --map normal=scan_nrm.png
   texforge regular cloth.jpg -o cloth.png --lattice 84.9,0.1,-0.2,127.3
   texforge regular gravel.jpg -o gravel.png --size 2048 --lattice none";
-
-/// How many pixels are made at a time: some hundred megabytes, and tens of rows of blocks.
-const STRIP_PIXELS: usize = 1 << 23;
 
 /// The command as it is typed.
 pub(super) fn command() -> Command {
@@ -245,51 +242,26 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Str
     Ok((summary(ctx, request, report, files, notes, elapsed.as_secs_f64()), line))
 }
 
-/// Writes all outputs side by side while the texture is made from top to bottom.
+/// Writes all outputs while the texture is made from top to bottom.
 fn write_strips(
     session: &Session,
     ctx: &Ctx,
     maker: &RegularMaker<'_>,
     outputs: &[Output<'_>],
 ) -> Result<()> {
-    let height = maker.size().1;
-    std::thread::scope(|scope| {
-        let (mut ends, mut writers) = (Vec::new(), Vec::new());
-        for output in outputs {
-            // One piece waits while the next is made.
-            let (send, rows) = mpsc::sync_channel::<Picture>(1);
-            ends.push(send);
-            writers.push(scope.spawn(move || {
-                let (path, kind, record) = (&output.path, output.kind, output.record.clone());
-                let options = WriteOptions { kind, record, force: true };
-                session.staging.stage_with(session, path, |out| {
-                    write_rows(out, path, height, rows.into_iter().map(Ok), &options)
-                })
-            }));
-        }
-        let make = || {
-            for strip in maker.strips(ctx, STRIP_PIXELS)? {
-                let strip = strip?;
-                for (output, send) in outputs.iter().zip(&ends) {
-                    let piece = ctx.install(|| strip.picture(output.of, output.kind))?;
-                    if send.send(piece).is_err() {
-                        // The writer has failed; it says why.
-                        return Ok(());
-                    }
-                }
-            }
-            Ok(())
-        };
-        let made = make();
-        drop(ends);
-        let panicked = || Error::Internal { message: "a writer panicked".into() };
-        let join = |writer: std::thread::ScopedJoinHandle<'_, Result<()>>| {
-            writer.join().unwrap_or_else(|_| Err(panicked()))
-        };
-        // Without all rows the writers fail as well: the first reason is the one to tell.
-        let written: Vec<Result<()>> = writers.into_iter().map(join).collect();
-        made.and_then(|()| written.into_iter().collect())
-    })
+    let files: Vec<_> = outputs
+        .iter()
+        .map(|Output { path, kind, record, .. }| {
+            let options = WriteOptions { kind: *kind, record: record.clone(), force: true };
+            (path.as_path(), options)
+        })
+        .collect();
+    let pictures = maker.strips(ctx, STRIP_PIXELS)?.map(|strip| {
+        let strip = strip?;
+        let piece = |output: &Output<'_>| strip.picture(output.of, output.kind);
+        ctx.install(|| outputs.iter().map(piece).collect())
+    });
+    strips::write(session, &files, maker.size().1, pictures)
 }
 
 fn line(request: &Request, report: &RegularReport, elapsed: std::time::Duration) -> String {

@@ -15,6 +15,7 @@ use crate::image::material::MapKind;
 use crate::image::picture::{Encoding, Picture};
 use crate::verb::extract::ExtractParams;
 use crate::verb::lattice::LatticeParams;
+use crate::verb::noise::{NoiseEditParams, NoiseParams};
 use crate::verb::params::TileParams;
 use crate::verb::regular::RegularParams;
 
@@ -30,6 +31,8 @@ pub(super) const SCHEMAS: &[Schema] = &[
     (LatticeParams::VERB, LatticeParams::schema),
     (RegularParams::VERB, RegularParams::schema),
     (ExtractParams::VERB, ExtractParams::schema),
+    (NoiseParams::VERB, NoiseParams::schema),
+    (NoiseEditParams::VERB, NoiseEditParams::schema),
 ];
 
 /// `texforge params`.

@@ -135,9 +135,8 @@ impl GroupShape {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::method::noise::{
-        Band, BandPart, Channel, Document, Evaluator, MapSpec, Model, Score, Shape,
-    };
+    use crate::method::noise::{Band, Channel, Document, Evaluator, MapSpec, Model, Score, Shape};
+    use crate::signal::wavelet_noise::Part;
 
     /// Five channels, every other one with a histogram; bands that differ along the axes.
     fn program() -> (Program, Vec<f64>) {
@@ -147,8 +146,8 @@ mod tests {
             histogram: (k % 2 == 0).then(|| histogram.clone()),
         });
         let bands = vec![
-            Band { levels: [0, 3], parts: [BandPart::Fine, BandPart::Low] },
-            Band { levels: [5, 2], parts: [BandPart::Low, BandPart::Band] },
+            Band { levels: [0, 3], parts: [Part::Fine, Part::Low] },
+            Band { levels: [5, 2], parts: [Part::Low, Part::Band] },
         ];
         let map = MapSpec {
             name: "all".into(),

@@ -9,6 +9,7 @@ mod house;
 mod io;
 mod lattice;
 mod measures;
+mod noise;
 mod options;
 mod quality;
 mod redo;

@@ -28,7 +28,7 @@ use crate::image::material::MapKind;
 use crate::image::picture::{Encoding, Meta, Picture, Samples};
 
 pub use files::{read_text, write_files};
-pub use place::check_output;
+pub use place::{check_output, check_place};
 pub use record::read_record;
 pub use rows::write_rows;
 pub use source_map::{encode_source_map, read_source_map, write_source_map};

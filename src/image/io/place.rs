@@ -30,7 +30,11 @@ pub(super) fn known_extension(path: &Path) -> Result<Format> {
     })
 }
 
-pub(super) fn check_place(path: &Path, inputs: &[&Path], force: bool) -> Result<()> {
+/// The same for a file that is no picture: any extension, or none.
+///
+/// # Errors
+/// [`Error::Io`], [`Error::SameFile`], [`Error::Exists`].
+pub fn check_place(path: &Path, inputs: &[&Path], force: bool) -> Result<()> {
     let io = |path: &Path, source| Error::Io { action: "write", path: path.to_owned(), source };
     if path.is_dir() {
         return Err(io(path, ErrorKind::IsADirectory.into()));

@@ -115,7 +115,7 @@ pub fn analyse(ctx: &Ctx, exemplar: &Exemplar, options: Options) -> Result<Analy
     let chosen = axes.into_iter().filter(|(variance, _)| *variance > LEAST_SHARE * total);
     let axes: Vec<Vec<f64>> = chosen.map(|(_, axis)| axis).collect();
     let spectrum = |(k, axis): (usize, &Vec<f64>)| {
-        let spectrum = spectrum(along(exemplar, &mean, axis), exemplar, options, k == 0);
+        let spectrum = spectrum(&along(exemplar, &mean, axis), exemplar, options, k == 0);
         ctx.step(1)?;
         Ok(spectrum)
     };
@@ -246,7 +246,7 @@ impl Bands {
 
 /// Histogram and spectrum of one independent channel, and on demand what noise cannot hold of it.
 fn spectrum(
-    plane: Vec<f32>,
+    plane: &[f32],
     exemplar: &Exemplar,
     options: Options,
     with_structure: bool,
@@ -260,12 +260,12 @@ fn spectrum(
         power.iter_mut().for_each(|p| *p *= gain);
         power
     };
-    let ranks = Ranks::new(&plane, exemplar, variance);
-    let normal = (with_structure || options.direct).then(|| ranks.gaussianised(&plane, exemplar));
+    let ranks = Ranks::new(plane, exemplar, variance);
+    let normal = (with_structure || options.direct).then(|| ranks.gaussianised(plane, exemplar));
     let power = match &normal {
         Some(normal) if options.direct && options.histogram => power(normal),
-        _ if options.direct || !options.histogram => power(&plane),
-        _ => before_shape(&Shape::new(&ranks.knots), &power(&plane), exemplar.shape),
+        _ if options.direct || !options.histogram => power(plane),
+        _ => before_shape(&Shape::new(&ranks.knots), &power(plane), exemplar.shape),
     };
     let structure = normal
         .filter(|_| with_structure)
@@ -364,7 +364,7 @@ mod tests {
         let view =
             raster::View { size: (rows, cols), scale: 1.0, origin: [77.0, 5.0], tileable: false };
         let evaluator = Evaluator::new(document);
-        vec![raster::render(&ctx, &evaluator, &view, Filter::NONE).expect("a picture")]
+        vec![raster::render(&ctx, &evaluator, &view, 0..rows, Filter::NONE).expect("a picture")]
     }
 
     fn analysed(planes: &[Vec<f32>], shape: (usize, usize), options: Options) -> Analysis {

@@ -10,8 +10,8 @@ pub mod evaluate;
 pub mod fit;
 mod morph;
 pub mod oriented;
-pub mod raster;
 mod ranks;
+pub mod raster;
 pub mod score;
 mod shape;
 

@@ -1,6 +1,7 @@
 //! [`render`]: pictures of a procedural texture.
 
 use std::collections::HashMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -32,14 +33,21 @@ struct Grid {
     per_pixel: Option<[f64; 2]>,
 }
 
-/// Renders `view`, a step of progress to a row: row by row, for every pixel all channels, with full scale 1, not clipped.
+/// Renders these rows of `view`, a step of progress to each: row by row, for every pixel all channels, with
+/// full scale 1, not clipped. The same bits whichever rows are rendered together.
 ///
 /// # Errors
 /// [`Error::Cancelled`](crate::Error::Cancelled).
-pub fn render(ctx: &Ctx, evaluator: &Evaluator, view: &View, filter: Filter) -> Result<Vec<f32>> {
-    let (rows, cols) = view.size;
+pub fn render(
+    ctx: &Ctx,
+    evaluator: &Evaluator,
+    view: &View,
+    rows: Range<usize>,
+    filter: Filter,
+) -> Result<Vec<f32>> {
+    let cols = view.size.1;
     let channels = evaluator.channels();
-    let mut out = vec![0.0; rows * cols * channels];
+    let mut out = vec![0.0; rows.len() * cols * channels];
     let at = |i: usize, axis: usize| view.origin[axis] + (i as f64 + 0.5) * view.scale;
     if evaluator.turn.is_some() {
         // Not along the axes: point by point.
@@ -47,6 +55,7 @@ pub fn render(ctx: &Ctx, evaluator: &Evaluator, view: &View, filter: Filter) -> 
         return lines
             .try_for_each(|(y, line)| {
                 ctx.step(1)?;
+                let y = rows.start + y;
                 let points: Vec<_> = (0..cols).map(|x| [at(x, 0), at(y, 1)]).collect();
                 evaluator.plane(&points, filter, line);
                 Ok(())
@@ -89,6 +98,7 @@ pub fn render(ctx: &Ctx, evaluator: &Evaluator, view: &View, filter: Filter) -> 
         },
         |(noise, combined, one), (y, line)| {
             ctx.step(1)?;
+            let y = rows.start + y;
             noise.fill(0.0);
             for (c, (channel, noise)) in
                 evaluator.channels.iter().zip(noise.chunks_mut(cols)).enumerate()

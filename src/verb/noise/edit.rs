@@ -135,9 +135,8 @@ fn set_mean(document: &mut Document, map: &str, mean: &[f64]) -> Result<()> {
 mod tests {
     use super::*;
     use crate::base::ctx::Ctx;
-    use crate::method::noise::{
-        Band, BandPart, BandShape, Channel, Filter, KNOTS, MapSpec, Model, Score,
-    };
+    use crate::method::noise::{Band, BandShape, Channel, Filter, KNOTS, MapSpec, Model, Score};
+    use crate::signal::wavelet_noise::Part;
     use crate::signal::wavelet_noise::spectrum::at_pixels;
 
     type Change = Box<dyn Fn(&mut NoiseEdit)>;
@@ -314,7 +313,7 @@ mod tests {
     fn directed_bands_move_too() {
         let mut document = texture(None).document().clone();
         let channels = document.channels().to_vec();
-        let band = |levels| Band { levels, parts: [BandPart::Band, BandPart::Low] };
+        let band = |levels| Band { levels, parts: [Part::Band, Part::Low] };
         let bands = [[0, 1], [1, 1], [2, 1], [1, 3]].map(band).to_vec();
         document.model = Model::Oriented { angle: 10.0, bands, channels };
         let texture = NoiseTexture::new(document);

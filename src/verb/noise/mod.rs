@@ -2,6 +2,7 @@
 
 mod edit;
 mod params;
+mod sheet;
 mod texture;
 
 use std::time::Instant;
@@ -22,7 +23,7 @@ use crate::method::noise::{BandShape, Document, MapSpec, Model, Score};
 
 pub use edit::{NoiseEdit, NoiseEditParams};
 pub use params::{Bands, Directions, Histogram, NoiseParams, Weights};
-pub use texture::{NoiseTexture, RenderParams, SampleType};
+pub use texture::{NoiseTexture, RenderParams, RenderedMap, SampleType};
 
 /// Shortest side of a photo that can be fitted: a few bands.
 const SMALLEST: usize = 16;
@@ -79,7 +80,8 @@ pub struct NoiseReport {
 /// The same maps, mask and parameters give the same document on any number of threads.
 ///
 /// # Errors
-/// [`Error::Parameter`] for a parameter out of range, no map or two of one name; [`Error::TooSmall`] below
+/// [`Error::Parameter`] for a parameter out of range, a seed of more than 32 bits, no map or two of one
+/// name; [`Error::TooSmall`] below
 /// 16 x 16 pixels; [`Error::SizeMismatch`] if a map or the mask has another size than the first map;
 /// [`Error::NotFinite`]; [`Error::EmptyMask`]; [`Error::BadPicture`] if all is of one colour;
 /// [`Error::Memory`]; [`Error::Cancelled`].
@@ -90,6 +92,9 @@ pub fn fit_noise(
     params: &NoiseParams,
 ) -> Result<(NoiseTexture, NoiseReport)> {
     params.validate()?;
+    if ctx.seed > u64::from(u32::MAX) {
+        return Err(Error::parameter("seed", format!("at most {}", u32::MAX), ctx.seed));
+    }
     ctx.install(|| run(ctx, maps, mask, params))
 }
 

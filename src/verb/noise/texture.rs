@@ -1,5 +1,6 @@
 //! [`NoiseTexture`]: a fitted texture, evaluated, rendered, changed.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -8,7 +9,7 @@ use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
 use crate::base::memory::ensure_available;
 use crate::base::params::Value as _;
-use crate::export::Program;
+use crate::export::{ExportFile, Program, Target, export};
 use crate::image::material::MapKind;
 use crate::image::picture::{Encoding, Picture, Sample as _, Samples};
 use crate::method::noise::raster::{self, View};
@@ -30,6 +31,9 @@ pub enum SampleType {
     /// Single floats, not clipped.
     F32,
 }
+
+/// A map's name, kind and picture.
+pub type RenderedMap = (String, MapKind, Picture);
 
 /// What part of a texture is rendered, and how.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -83,9 +87,13 @@ impl NoiseTexture {
         self.evaluator.document()
     }
 
-    /// The numbers that a shader needs to compute it.
-    pub fn program(&self) -> Program {
-        Program::new(&self.evaluator)
+    /// The texture as files for another program; `name` names them and the functions in them, with `_` for
+    /// what cannot stand in a name.
+    ///
+    /// # Errors
+    /// Those of [`export`](crate::export::export()).
+    pub fn export(&self, name: &str, target: Target) -> Result<Vec<ExportFile>> {
+        export(name, &Program::new(&self.evaluator), target)
     }
 
     /// Number of channels of a value: those of all maps, one after the other.
@@ -207,13 +215,24 @@ impl NoiseTexture {
     ///
     /// # Errors
     /// [`Error::Parameter`] for a size of 0 or more than 65536, a scale or an origin out of range, or a
-    /// tileable texture of less than 4 pixels of the photo or with turned directions; [`Error::Memory`];
-    /// [`Error::Cancelled`].
-    pub fn render(
+    /// tileable texture with turned directions; [`Error::Memory`]; [`Error::Cancelled`].
+    pub fn render(&self, ctx: &Ctx, params: &RenderParams) -> Result<Vec<RenderedMap>> {
+        let (width, height) = params.size;
+        let mut strips = self.strips(ctx, params, width.saturating_mul(height))?;
+        strips.next().unwrap_or_else(|| Ok(Vec::new()))
+    }
+
+    /// The same pictures from top to bottom, about so many pixels of each at a time, for those larger than
+    /// memory: every strip has the rows that [`NoiseTexture::render`] gives.
+    ///
+    /// # Errors
+    /// Those of [`NoiseTexture::render`].
+    pub fn strips(
         &self,
         ctx: &Ctx,
         params: &RenderParams,
-    ) -> Result<Vec<(String, MapKind, Picture)>> {
+        pixels: usize,
+    ) -> Result<impl Iterator<Item = Result<Vec<RenderedMap>>> + use<'_>> {
         let (width, height) = params.size;
         if [width, height].iter().any(|n| !(1..=Picture::MAX_SIDE).contains(n)) {
             return Err(Error::parameter(
@@ -228,8 +247,24 @@ impl NoiseTexture {
             let expected = "off for this texture, whose directions are turned";
             return Err(Error::parameter("tileable", expected, "on"));
         }
-        let bytes = width.checked_mul(height).and_then(|n| n.checked_mul(self.channels() * 8));
+        let rows = (pixels / width).clamp(1, height);
+        let bytes = (width * rows).checked_mul(self.channels() * 8);
         ensure_available("the picture", bytes.map(|n| n as u64))?;
+        ctx.begin(height as u64);
+        let (ctx, params) = (ctx.clone(), *params);
+        let strip =
+            move |first: usize| self.strip(&ctx, &params, first..(first + rows).min(height));
+        Ok((0..height).step_by(rows).map(strip))
+    }
+
+    /// Some rows of all maps.
+    fn strip(
+        &self,
+        ctx: &Ctx,
+        params: &RenderParams,
+        rows: Range<usize>,
+    ) -> Result<Vec<RenderedMap>> {
+        let (width, height) = params.size;
         let view = View {
             size: (height, width),
             scale: params.scale,
@@ -238,13 +273,13 @@ impl NoiseTexture {
         };
         let filter =
             Filter { footprint: footprint(params.scale), keep_contrast: params.keep_contrast };
-        ctx.begin(height as u64);
-        let values = ctx.install(|| raster::render(ctx, &self.evaluator, &view, filter))?;
+        let size = (rows.len(), width);
+        let values = ctx.install(|| raster::render(ctx, &self.evaluator, &view, rows, filter))?;
         let mut first = 0;
         let maps = self.document().maps.iter().map(|map| {
             let (from, kind) = (first, MapKind::parse(&map.kind).unwrap_or(MapKind::Data));
             first += map.channels;
-            let picture = self.picture(&values, from, map, kind, params)?;
+            let picture = self.picture(&values, from, map, kind, (size, params.samples))?;
             Ok((map.name.clone(), kind, picture))
         });
         maps.collect()
@@ -257,7 +292,7 @@ impl NoiseTexture {
         first: usize,
         map: &MapSpec,
         kind: MapKind,
-        params: &RenderParams,
+        ((height, width), samples): ((usize, usize), SampleType),
     ) -> Result<Picture> {
         let pixels =
             values.chunks_exact(self.channels()).flat_map(|v| &v[first..first + map.channels]);
@@ -265,7 +300,7 @@ impl NoiseTexture {
         if kind.is_normal() && map.channels == 3 {
             pixels.chunks_exact_mut(3).for_each(upright);
         }
-        let samples = match params.samples {
+        let samples = match samples {
             SampleType::U8 => {
                 Samples::U8(pixels.iter().map(|&v| u8::from_unit(f64::from(v))).collect())
             }
@@ -279,7 +314,6 @@ impl NoiseTexture {
             "linear" => Encoding::Linear,
             _ => Encoding::Data,
         };
-        let (width, height) = params.size;
         Picture::new(height, width, map.channels, samples, encoding)
     }
 }

@@ -199,8 +199,9 @@ fn what_does_not_match_is_refused() {
 
 #[test]
 fn directions_turn_the_shorter_way() {
-    use crate::method::noise::{Band, BandPart};
-    let band = |levels| Band { levels, parts: [BandPart::Band, BandPart::Low] };
+    use crate::method::noise::Band;
+    use crate::signal::wavelet_noise::Part;
+    let band = |levels| Band { levels, parts: [Part::Band, Part::Low] };
     let oriented = |angle, bands: Vec<Band>, weights: &[f64]| {
         let mut document = document(vec![vec![1.0]], &[weights], false);
         let channels = document.channels().to_vec();
