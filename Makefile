@@ -63,7 +63,8 @@ $(BLENDER_VENV)/.ready: pyproject.toml
 	$(BLENDER_VENV)/bin/python -m pip install --quiet --disable-pip-version-check -r $(BLENDER_VENV)/requirements.txt
 	touch $@
 
-test-blender: $(BLENDER_VENV)/.ready ## Compile and render the OSL and Blender exports in Blender (1 GB).
+test-blender: $(BLENDER_VENV)/.ready $(BIN)/.ready ## Compile and render the OSL and Blender exports in Blender (1 GB).
+	$(call install_wheel,dev)
 	$(BLENDER_VENV)/bin/python -m pytest tests/blender
 
 lint: $(BIN)/.ready ## Check formatting, lints and types.

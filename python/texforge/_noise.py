@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -16,6 +17,7 @@ from texforge._progress import reporting
 from texforge._types import (
     Bands,
     Encoding,
+    ExportTarget,
     Histogram,
     Image,
     ImageLike,
@@ -674,6 +676,75 @@ class NoiseTexture:
             seed=None if seed is None else _arrays.integer("seed", seed, 0, 2**32 - 1),
         )
         return NoiseTexture(core)
+
+    def export(self, target: ExportTarget, *, name: str = "texture") -> dict[str, bytes]:
+        """Write the texture on the plane for another program: a shader that computes the same.
+
+        Parameters
+        ----------
+        target : {"glsl", "glsl-es", "wgsl", "hlsl", "osl"}
+            The language: desktop OpenGL and Vulkan; WebGL 2, Three.js and Godot; WebGPU; Unity and
+            Unreal; Blender's Cycles and other renderers.
+        name : str
+            What files and functions are called; what cannot stand in a name becomes ``_``.
+
+        Returns
+        -------
+        dict of str to bytes
+            The files by name.
+
+        Raises
+        ------
+        ParameterError
+            If the target is unknown (also a ValueError).
+        """
+        return dict(
+            self._core.export(
+                target=_arrays.word("target", target), name=_arrays.word("name", name)
+            )
+        )
+
+    def export_to(
+        self,
+        folder: PathType,
+        target: ExportTarget,
+        *,
+        name: str = "texture",
+        overwrite: bool = False,
+    ) -> list[Path]:
+        """Write the files of `export` into a folder that exists, each at once or not at all.
+
+        Parameters
+        ----------
+        folder : path
+            The folder.
+        target : {"glsl", "glsl-es", "wgsl", "hlsl", "osl"}
+            As for `export`.
+        name : str
+            As for `export`.
+        overwrite : bool
+            Whether existing files may be replaced. If not, and there is one, none is written.
+
+        Returns
+        -------
+        list of Path
+            The files.
+
+        Raises
+        ------
+        ParameterError
+            If the target is unknown (also a ValueError).
+        OutputExistsError
+            If a file exists and `overwrite` is False (also a FileExistsError).
+        MissingFileError, AccessError, FileError
+            If the operating system refuses (also FileNotFoundError, PermissionError, OSError).
+        """
+        base = Path(_arrays.path(folder))
+        files = [(base / file, data) for file, data in self.export(target, name=name).items()]
+        _texforge.write_files(
+            files=[(str(path), data) for path, data in files], overwrite=bool(overwrite)
+        )
+        return [path for path, _ in files]
 
     def __eq__(self, other: object) -> bool:
         """Compare the documents."""

@@ -27,6 +27,7 @@ __all__ = [
     "Bands",
     "Costs",
     "Encoding",
+    "ExportTarget",
     "Follow",
     "Histogram",
     "Image",
@@ -89,6 +90,10 @@ Weights: TypeAlias = Literal["corrected"] | Literal["direct"]
 """How the bands' weights follow from the photo's spectrum."""
 Histogram: TypeAlias = Literal["kept"] | Literal["normal"]
 """What becomes of the photo's histograms."""
+ExportTarget: TypeAlias = (
+    Literal["glsl"] | Literal["glsl-es"] | Literal["wgsl"] | Literal["hlsl"] | Literal["osl"]
+)
+"""A language or a program that a procedural texture is written for."""
 SampleType: TypeAlias = Literal["uint8"] | Literal["uint16"] | Literal["float32"]
 """The samples of a rendered picture."""
 Encoding: TypeAlias = Literal["srgb"] | Literal["linear"] | Literal["data"]

@@ -2,7 +2,17 @@
 //!
 //! [`Program`] lists what every target needs; each target is one file that turns it into text.
 
+mod blender;
+mod glsl;
+mod hlsl;
+mod materialx;
+mod names;
+mod nodes;
+mod osl;
 mod program;
+mod shader;
+mod tile;
+mod wgsl;
 
 use crate::base::error::Result;
 use crate::base::params::choice;
@@ -22,6 +32,10 @@ choice! {
         Hlsl = "hlsl",
         /// Open Shading Language: Blender's Cycles and other renderers.
         Osl = "osl",
+        /// MaterialX: Houdini, Maya, Unreal, USD.
+        Materialx = "materialx",
+        /// A Python script that builds a node group in Blender, for Eevee and Cycles.
+        Blender = "blender",
     }
 }
 
@@ -42,6 +56,14 @@ pub struct ExportFile {
 /// # Errors
 /// [`Error::Format`](crate::Error::Format) if a picture cannot be written, which would be a bug.
 pub fn export(texture_name: &str, program: &Program, target: Target) -> Result<Vec<ExportFile>> {
-    let _ = (texture_name, program, target);
-    Ok(Vec::new())
+    let name = &names::identifier(texture_name, "texture");
+    match target {
+        Target::Glsl => glsl::glsl(name, program, false),
+        Target::GlslEs => glsl::glsl(name, program, true),
+        Target::Wgsl => wgsl::wgsl(name, program),
+        Target::Hlsl => hlsl::hlsl(name, program),
+        Target::Osl => Ok(osl::osl(name, program)),
+        Target::Materialx => materialx::materialx(program, name),
+        Target::Blender => Ok(blender::blender(program, name)),
+    }
 }

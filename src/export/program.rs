@@ -1,7 +1,11 @@
 //! [`Program`]: a procedural texture as the numbers that a shader computes with.
 
+use crate::base::params::Value as _;
+use crate::image::material::MapKind;
+use crate::method::noise::document::Term;
 use crate::method::noise::{Evaluator, Filter};
 use crate::signal::wavelet_noise::Torus;
+use crate::signal::wavelet_noise::spectrum::at_pixels;
 
 /// A procedural texture on the plane as the numbers that a shader computes with.
 ///
@@ -18,7 +22,9 @@ use crate::signal::wavelet_noise::Torus;
 ///    the encodings of the maps, not clipped.
 ///
 /// To filter for samples that are f pixels apart, a term with l = min(`levels`) is multiplied by
-/// smoothstep of clamp(1 + l - log2 f, 0, 1).
+/// k = smoothstep of clamp(1 + l - log2 f, 0, 1). What is lost has a variance of d^2 = the sum over the terms
+/// of `shares[t]` (1 - k^2), in deviations, and the shape is replaced by its mean over a normal
+/// distribution of that variance, by three places: u - sqrt(3) d and u + sqrt(3) d count 1/6, u counts 2/3.
 #[derive(Debug, Clone)]
 pub struct Program {
     /// Tiles of coefficients: 16-bit integers of [`Torus::SIDE`] rows and columns, and their scale.
@@ -35,6 +41,8 @@ pub struct Program {
     pub matrix: Vec<Vec<f32>>,
     /// Name, encoding (`srgb`, `linear`, `data`) and number of outputs of each map, in order.
     pub maps: Vec<(String, String, usize)>,
+    /// What the numbers of each map are.
+    pub kinds: Vec<MapKind>,
     /// Width and height of the photo in pixels.
     pub size: [u32; 2],
 }
@@ -55,6 +63,8 @@ pub struct ProgramChannel {
     pub weights: Vec<f32>,
     /// By how many pixels each term is moved along x and y: whole numbers, less than 2^24.
     pub offsets: Vec<[u32; 2]>,
+    /// The share of each term in the variance.
+    pub shares: Vec<f32>,
     /// From noise to standard deviations.
     pub per_deviation: f32,
     /// Of every piece of the histogram's function: the knot where it begins, then c0 to c3 and r: with
@@ -90,7 +100,15 @@ impl Program {
                     let [x, y, _] = document.offset(t, [x, y, x], c);
                     [x, y]
                 };
+                let variance = |(w, term): (&f32, &Term)| {
+                    f64::from(*w).powi(2) * at_pixels(term.detail, term.levels)
+                };
+                let variances: Vec<f64> =
+                    filtered.weights.iter().zip(&document.terms()).map(variance).collect();
+                let total: f64 = variances.iter().sum();
+                let share = |v: &f64| if total > 0.0 { (v / total) as f32 } else { 0.0 };
                 ProgramChannel {
+                    shares: variances.iter().map(share).collect(),
                     weights: filtered.weights,
                     offsets: terms.iter().enumerate().map(offset).collect(),
                     per_deviation: filtered.per_deviation,
@@ -108,6 +126,11 @@ impl Program {
                 .maps
                 .iter()
                 .map(|map| (map.name.clone(), map.encoding.clone(), map.channels))
+                .collect(),
+            kinds: document
+                .maps
+                .iter()
+                .map(|map| MapKind::parse(&map.kind).unwrap_or(MapKind::Data))
                 .collect(),
             size: document.size,
         }

@@ -436,7 +436,7 @@ mod _texforge {
     #[pymodule_export]
     use super::extract::extract;
     #[pymodule_export]
-    use super::noise::{Noise, fit_noise, write_files};
+    use super::noise::{Noise, export_targets, fit_noise, write_files};
     #[pymodule_export]
     use super::regular::regular;
     #[pymodule_export]

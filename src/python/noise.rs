@@ -7,6 +7,8 @@ use pyo3::types::{PyByteArray, PyBytes};
 
 use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
+use crate::base::params::Value as _;
+use crate::export::{Target, export};
 use crate::image::io;
 use crate::image::mask::Mask;
 use crate::method::noise::Filter;
@@ -220,6 +222,28 @@ impl Noise {
         let texture = self.0.clone();
         enter::unheard(py, move || texture.edit(&edit)).map(Self)
     }
+
+    /// Files of the texture for a target, by name.
+    #[pyo3(signature = (*, target, name))]
+    fn export<'py>(
+        &self,
+        py: Python<'py>,
+        target: &str,
+        name: String,
+    ) -> PyResult<Vec<(String, Bound<'py, PyBytes>)>> {
+        let target = Target::parse(target)
+            .ok_or_else(|| Error::parameter("target", Target::expected(), format!("`{target}`")))
+            .into_py(py)?;
+        let texture = self.0.clone();
+        let files = enter::unheard(py, move || export(&name, &texture.program(), target))?;
+        Ok(files.into_iter().map(|f| (f.name, PyBytes::new(py, &f.bytes))).collect())
+    }
+}
+
+/// The targets of exports.
+#[pyfunction]
+pub(super) fn export_targets() -> Vec<&'static str> {
+    Target::CHOICES.to_vec()
 }
 
 /// Writes files, each whole or not at all.

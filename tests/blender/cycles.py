@@ -103,7 +103,7 @@ def render_node_group(
         before = set(bpy.data.node_groups)
         runpy.run_path(str(script), run_name="__main__")
         # Groups inside the group are made as well: it is the one that no other uses.
-        made = [g for g in bpy.data.node_groups if g not in before and not g.users]
+        made = [g for g in bpy.data.node_groups if g not in before and g.users == g.use_fake_user]
         if len(made) != 1:
             raise ValueError(f"{script} made {len(made)} node groups that no other uses")
         node = tree.nodes.new("ShaderNodeGroup")
@@ -155,6 +155,8 @@ def _settings(scene: Any, size: tuple[int, int], engine: Engine, *, osl: bool) -
     render.image_settings.color_depth = "32"
     render.image_settings.exr_codec = "ZIP"
     scene.eevee.taa_render_samples = 1
+    # On the processor it blurs what is magnified.
+    bpy.context.preferences.system.anisotropic_filter = "FILTER_0"
     cycles = scene.cycles
     cycles.device = "CPU"
     cycles.shading_system = osl

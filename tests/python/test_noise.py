@@ -7,6 +7,7 @@ import itertools
 import json
 import pickle
 import statistics
+import typing
 from typing import TYPE_CHECKING, Any
 
 import hypothesis
@@ -546,6 +547,33 @@ def test_editing(material: texforge.NoiseTexture) -> None:
     weights = [d.document["model"]["wavelet"]["channels"][0]["weights"] for d in (wide, material)]
     assert len(weights[0]) == len(weights[1]) + 1
     assert "histogram" not in material.edit(histogram="normal").to_json()
+
+
+def test_exporting(sand: texforge.NoiseTexture, tmp_path: Path) -> None:
+    alternatives = typing.get_args(texforge.ExportTarget)
+    targets = [typing.get_args(alternative)[0] for alternative in alternatives]
+    assert targets == _texforge.export_targets()
+    for target in targets:
+        files = sand.export(target, name="beach")
+        assert files
+        assert files == sand.export(target, name="beach")
+        assert all("beach" in name and data for name, data in files.items())
+        folder = tmp_path / target
+        with pytest.raises(FileNotFoundError):
+            sand.export_to(folder, target, name="beach")
+        folder.mkdir()
+        written = sand.export_to(str(folder), target, name="beach")
+        assert {path.name: path.read_bytes() for path in folder.iterdir()} == files
+        assert sorted(written) == sorted(folder.iterdir())
+        with pytest.raises(texforge.OutputExistsError):
+            sand.export_to(folder, target, name="beach")
+        sand.export_to(folder, target, name="beach", overwrite=True)
+    wrong: tuple[Any, ...] = ("cobol", "", 3, None)
+    for target in wrong:
+        with pytest.raises(texforge.ParameterError, match=r"^`target` must be .+, got "):
+            sand.export(target)
+    with pytest.raises(texforge.ParameterError, match="name"):
+        sand.export("glsl", name=3)  # type: ignore[arg-type]
 
 
 BAD_EDITS: dict[str, dict[str, Any]] = {

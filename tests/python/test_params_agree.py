@@ -68,6 +68,8 @@ def test_everything_but_the_picture_is_keyword_only() -> None:
         texforge.fit_noise,
         texforge.NoiseTexture.at,
         texforge.NoiseTexture.edit,
+        texforge.NoiseTexture.export,
+        texforge.NoiseTexture.export_to,
         texforge.NoiseTexture.render,
         texforge.NoiseTexture.render_maps,
         texforge.NoiseTexture.save,

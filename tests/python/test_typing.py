@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, assert_type
 
 import numpy as np
@@ -12,7 +13,6 @@ from tqdm import tqdm
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
 
 def test_a_tile_from_everything(tmp_path: Path) -> None:
@@ -69,6 +69,8 @@ def test_a_procedural_texture(tmp_path: Path) -> None:
     assert_type(texture.size, tuple[int, int])
     texture.save(tmp_path / "texture.json")
     assert_type(texforge.NoiseTexture.load(tmp_path / "texture.json"), texforge.NoiseTexture)
+    assert_type(texture.export("glsl"), dict[str, bytes])
+    assert_type(texture.export_to(tmp_path, "osl", name="sand"), list[Path])
     edited = texture.edit(contrast=0.5, gains=[0, 1.5], means={"height": 0.5}, seed=3)
     assert_type(edited.morph(texture, 0.25), texforge.NoiseTexture)
 

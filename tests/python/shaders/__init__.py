@@ -6,7 +6,7 @@ Every picture is float32, height x width x 4; its pixel `[y, x]` is what the sha
 
 from .gl import compile_glsl, render_glsl
 from .hlsl import compile_hlsl, render_hlsl
-from .materialx import generate_glsl, render_materialx, validate_materialx
+from .materialx import generate_glsl, generate_text, render_materialx, validate_materialx
 from .tools import ShaderError
 from .webgpu import compile_wgsl, render_wgsl
 
@@ -16,6 +16,7 @@ __all__ = [
     "compile_hlsl",
     "compile_wgsl",
     "generate_glsl",
+    "generate_text",
     "render_glsl",
     "render_hlsl",
     "render_materialx",

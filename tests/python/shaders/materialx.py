@@ -1,4 +1,7 @@
-"""MaterialX: validated by its own library, generated as GLSL, which is compiled and rendered."""
+"""MaterialX: validated by its own library, generated as GLSL, which is compiled and rendered.
+
+OSL and MDL are generated only.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,13 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import MaterialX
 import moderngl
 import numpy as np
-from MaterialX import PyMaterialXGenGlsl, PyMaterialXGenShader
+import texforge
+from MaterialX import (
+    PyMaterialXGenGlsl,
+    PyMaterialXGenMdl,
+    PyMaterialXGenOsl,
+    PyMaterialXGenShader,
+)
 from PIL import Image
 
 from .gl import bind, compile_glsl, context, draw, link
@@ -20,6 +29,8 @@ if TYPE_CHECKING:
 TARGETS = {
     "genglsl": PyMaterialXGenGlsl.GlslShaderGenerator,
     "essl": PyMaterialXGenGlsl.EsslShaderGenerator,
+    "genosl": PyMaterialXGenOsl.OslShaderGenerator,
+    "genmdl": PyMaterialXGenMdl.MdlShaderGenerator,
 }
 
 CLOSEST, PERIODIC = 0, 2
@@ -53,26 +64,16 @@ def generate_glsl(
     path: Path, element: str, target: Literal["genglsl", "essl"] = "genglsl"
 ) -> Generated:
     """Generate and compile the shaders of an element: a material, or `graph/output`."""
-    document = _read(path)
-    found = document.getDescendant(element)
-    if found is None:
-        raise ValueError(f"{path} has no element {element}")
-    generator = TARGETS[target].create()
-    colors = PyMaterialXGenShader.DefaultColorManagementSystem.create(target)
-    colors.loadLibrary(_library())
-    generator.setColorManagementSystem(colors)
-    generator.registerTypeDefs(document)
-    settings = PyMaterialXGenShader.GenContext(generator)
-    settings.registerSourceCodeSearchPath(MaterialX.getDefaultDataSearchPath())
-    settings.registerSourceCodeSearchPath(str(path.parent))
-    try:
-        shader = generator.generate(found.getName(), found, settings)
-    except PyMaterialXGenShader.ExceptionShaderGenError as error:
-        raise ShaderError(str(error)) from error
+    shader = _generate(path, element, target)
     vertex, pixel = (shader.getSourceCode(stage) for stage in ("vertex", "pixel"))
     compile_glsl(vertex, "vert")
     compile_glsl(pixel, "frag")
     return Generated(vertex, pixel, _files(shader, path.parent))
+
+
+def generate_text(path: Path, element: str, target: Literal["genosl", "genmdl"]) -> str:
+    """Generate an element in a language that is not compiled here."""
+    return str(_generate(path, element, target).getSourceCode("pixel"))
 
 
 def render_materialx(path: Path, element: str, size: tuple[int, int]) -> Picture:
@@ -120,6 +121,25 @@ def _read(path: Path) -> Any:
     return document
 
 
+def _generate(path: Path, element: str, target: str) -> Any:
+    document = _read(path)
+    found = document.getDescendant(element)
+    if found is None:
+        raise ValueError(f"{path} has no element {element}")
+    generator = TARGETS[target].create()
+    colors = PyMaterialXGenShader.DefaultColorManagementSystem.create(target)
+    colors.loadLibrary(_library())
+    generator.setColorManagementSystem(colors)
+    generator.registerTypeDefs(document)
+    settings = PyMaterialXGenShader.GenContext(generator)
+    settings.registerSourceCodeSearchPath(MaterialX.getDefaultDataSearchPath())
+    settings.registerSourceCodeSearchPath(str(path.parent))
+    try:
+        return generator.generate(found.getName(), found, settings)
+    except PyMaterialXGenShader.ExceptionShaderGenError as error:
+        raise ShaderError(str(error)) from error
+
+
 def _files(shader: Any, folder: Path) -> dict[str, Sampled]:
     """Return what the samplers read; how to read it is told beside, in uniforms."""
     ports = {
@@ -134,7 +154,8 @@ def _files(shader: Any, folder: Path) -> dict[str, Sampled]:
 
     files = {}
     for name, port in ports.items():
-        if port.getType().getName() == "filename":
+        # The light around a material has no file.
+        if port.getType().getName() == "filename" and port.getValue() is not None:
             node = name.removesuffix("file")
             files[name] = Sampled(
                 folder / port.getValue().getData(),
@@ -149,6 +170,9 @@ def _files(shader: Any, folder: Path) -> dict[str, Sampled]:
 
 def _pixels(path: Path) -> Texture:
     """Return a file's pixels, the last row first."""
+    if path.suffix == ".exr":
+        read = texforge.read_image(path, kind="data")
+        return np.ascontiguousarray(read[::-1], np.float32)
     with Image.open(path) as image:
         wanted = image.mode if image.mode in {"L", "LA", "RGB", "RGBA", "I;16"} else "RGBA"
         return np.ascontiguousarray(np.asarray(image.convert(wanted))[::-1])

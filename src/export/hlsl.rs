@@ -1,0 +1,74 @@
+//! HLSL: functions to include, and a shader that shows them.
+
+use super::shader::{Language, Output, about_tile, heading, outputs};
+use super::tile::tile_picture;
+use super::{ExportFile, Program};
+use crate::base::error::Result;
+
+const HLSL: Language = Language {
+    float: "float",
+    int: "int",
+    bool: "bool",
+    vectors: ["float2", "float3", "float4"],
+    name_first: false,
+    tile: &[("Texture2D<float4>", "tile"), ("int", "layer")],
+    coefficient: "    \
+    int row_of_tile = (row & 255) + 256 * layer;
+    const bool flipped = false; // true where pictures are loaded bottom row first, as in Unity
+    if (flipped) {
+        uint width, height;
+        tile.GetDimensions(width, height);
+        row_of_tile = int(height) - 1 - row_of_tile;
+    }
+    float2 bytes = tile.Load(int3(column & 255, row_of_tile, 0)).rg;
+    return dot(bytes, float2(65280.0, 255.0)) - 32768.0;
+",
+    handed: "tile, layer",
+    chosen: |tile| format!("tile, {tile}"),
+};
+
+/// `NAME.hlsl`, `NAME_example.hlsl` and the picture of coefficients.
+pub(super) fn hlsl(name: &str, program: &Program) -> Result<Vec<ExportFile>> {
+    let functions = heading(name, program, &about_tile(name, program))
+        + &HLSL.texture(name, program, ("Texture2D<float4>", "tile"));
+    let example = format!("{functions}{}", example(name, &outputs(program)));
+    Ok(vec![
+        ExportFile { name: format!("{name}.hlsl"), bytes: functions.into_bytes() },
+        ExportFile { name: format!("{name}_example.hlsl"), bytes: example.into_bytes() },
+        tile_picture(name, program)?,
+    ])
+}
+
+fn example(name: &str, outputs: &[Output]) -> String {
+    let returned = HLSL.returned(name, outputs);
+    let (uniform, shown) = match outputs {
+        [one] => (String::new(), format!("    return {};\n", HLSL.shown(one, "texture_here"))),
+        _ => {
+            let line = |(i, o): (usize, &Output)| {
+                let value = HLSL.shown(o, &format!("texture_here.{}", o.name));
+                format!("    if (shown == {i}) {{ color = {value}; }}\n")
+            };
+            let lines: String = outputs.iter().enumerate().map(line).collect();
+            let shown = format!(
+                "    float4 color = float4(0.0, 0.0, 0.0, 0.0);\n{lines}    return color;\n"
+            );
+            ("int shown; // which of the maps\n".into(), shown)
+        }
+    };
+    format!(
+        "
+// An example: the texture over the whole window.
+Texture2D<float4> {name}_tile;
+float2 origin; // of the window, in pixels of the photo
+float scale; // pixels of the photo to a pixel of the window
+float contrast;
+bool linear_light;
+{uniform}
+float4 example(float4 at : SV_Position) : SV_Target {{
+    float2 p = origin + scale * at.xy;
+    float footprint = max(length(ddx(p)), length(ddy(p)));
+    {returned} texture_here = {name}({name}_tile, p, footprint, contrast, linear_light);
+{shown}}}
+"
+    )
+}

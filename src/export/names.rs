@@ -1,0 +1,183 @@
+//! Names that every language takes.
+
+/// Words that people give to textures and maps, and that a language keeps for itself.
+const TAKEN: &[&str] = &[
+    "active",
+    "alias",
+    "auto",
+    "bool",
+    "break",
+    "buffer",
+    "case",
+    "cast",
+    "char",
+    "class",
+    "closure",
+    "color",
+    "common",
+    "const",
+    "coherent",
+    "discard",
+    "double",
+    "emit",
+    "enum",
+    "export",
+    "external",
+    "extern",
+    "false",
+    "filter",
+    "fixed",
+    "flat",
+    "float",
+    "fn",
+    "for",
+    "from",
+    "get",
+    "goto",
+    "half",
+    "handle",
+    "hash",
+    "highp",
+    "if",
+    "illuminance",
+    "illuminate",
+    "import",
+    "in",
+    "inline",
+    "inout",
+    "input",
+    "int",
+    "interface",
+    "invariant",
+    "layout",
+    "let",
+    "line",
+    "linear",
+    "loop",
+    "lowp",
+    "main",
+    "matrix",
+    "mediump",
+    "meta",
+    "metal",
+    "mod",
+    "module",
+    "new",
+    "noise",
+    "normal",
+    "open",
+    "out",
+    "output",
+    "package",
+    "partition",
+    "patch",
+    "pass",
+    "pixel",
+    "point",
+    "precise",
+    "precision",
+    "private",
+    "public",
+    "ref",
+    "resource",
+    "return",
+    "sample",
+    "sampler",
+    "set",
+    "shader",
+    "shared",
+    "short",
+    "signed",
+    "sin",
+    "cos",
+    "smooth",
+    "static",
+    "std",
+    "step",
+    "string",
+    "struct",
+    "surface",
+    "switch",
+    "target",
+    "technique",
+    "template",
+    "texture",
+    "triangle",
+    "true",
+    "type",
+    "uniform",
+    "union",
+    "unsigned",
+    "use",
+    "using",
+    "var",
+    "vector",
+    "void",
+    "volatile",
+    "volume",
+    "where",
+    "while",
+    "with",
+    "yield",
+    "abs",
+    "mix",
+    "normalize",
+    "floor",
+    "round",
+    "sign",
+    "displacement",
+    "maps",
+    "tile",
+    "fract",
+    "length",
+    "reflect",
+    "refract",
+    "transpose",
+    "x",
+    "y",
+    "pow",
+    "log",
+    "exp",
+    "ceil",
+    "clamp",
+    "dot",
+    "cross",
+    "distance",
+    "sqrt",
+    "tan",
+    "min",
+    "max",
+];
+
+/// A name of letters, digits and single underscores; `what` follows where it would be none or is taken.
+pub(super) fn identifier(name: &str, what: &str) -> String {
+    let mut out = String::new();
+    for c in name.chars() {
+        if c.is_ascii_alphanumeric() {
+            out.push(c);
+        } else if !out.ends_with('_') && !out.is_empty() {
+            out.push('_');
+        }
+    }
+    let mut out = out.trim_end_matches('_').to_owned();
+    if out.is_empty() || TAKEN.contains(&out.to_lowercase().as_str()) {
+        out = if out.is_empty() { what.to_owned() } else { format!("{out}_{what}") };
+    }
+    // A digit, or what OpenGL keeps.
+    if out.starts_with(|c: char| c.is_ascii_digit()) || out.starts_with("gl_") {
+        out = format!("{what}_{out}");
+    }
+    out
+}
+
+/// The same names, none of them twice.
+pub(super) fn fields(names: impl Iterator<Item = String>) -> Vec<String> {
+    let mut out: Vec<String> = Vec::new();
+    for name in names {
+        let taken = |candidate: &String| out.contains(candidate);
+        let numbered = (2..).map(|i| format!("{name}_{i}"));
+        let free = std::iter::once(name.clone()).chain(numbered).find(|c| !taken(c));
+        out.extend(free);
+    }
+    out
+}
