@@ -313,7 +313,7 @@ mod change {
         assert_eq!(edit(&[]), stone);
         assert_eq!(edit(&["--seed", "9"])["seed"], 9);
         let red = edit(&["--mean", "basecolor=#ff8000"])["mean"].clone();
-        assert_eq!(red, serde_json::json!([1.0, 0.501961, 0.0]));
+        assert_eq!(red, serde_json::json!([1.0, 0.501_961, 0.0]));
         let first = |v: &serde_json::Value| v["matrix"][0][0].as_f64().expect("a number");
         assert!((first(&edit(&["--contrast", "2"])) - 2.0 * first(&stone)).abs() < 2e-5);
         let smooth = edit(&["--gains", "0", "--histogram", "normal"]);

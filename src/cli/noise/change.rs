@@ -154,7 +154,7 @@ fn run(
         let textures = inputs.iter().map(|path| read(path)).collect::<Result<Vec<_>>>()?;
         let texture = change(&textures)?;
         write(session, &output, &texture, force)?;
-        Ok(said(session, verb, &output, &texture, params))
+        Ok(said(session, verb, &output, &texture, &params))
     })?;
     if matches.get_flag("json") { print_json(&summary) } else { Ok(()) }
 }
@@ -164,7 +164,7 @@ fn said(
     verb: &str,
     output: &Target,
     texture: &NoiseTexture,
-    params: Value,
+    params: &Value,
 ) -> Value {
     let (bytes, bands) = (texture.to_json().len(), texture.document().terms().len());
     let seed = texture.document().seed;

@@ -13,7 +13,7 @@ use crate::base::params::Value as _;
 use crate::cli::args;
 use crate::cli::small::{SCHEMA_VERSION, print_json};
 use crate::cli::work::{Session, supervise, watch_signals};
-use crate::export::{ExportFile, Target};
+use crate::export::{ExportFile, Target, export};
 use crate::image::io::check_place;
 
 const EXAMPLES: &str = "\
@@ -105,10 +105,11 @@ pub(super) fn run(matches: &ArgMatches) -> Result<()> {
 
 fn work(session: &Session, request: &Request) -> Result<serde_json::Value> {
     let texture = read(&request.document)?;
+    let program = texture.program();
     let mut files: Vec<(Target, PathBuf, Vec<u8>)> = Vec::new();
     for &target in &request.targets {
         session.check()?;
-        for ExportFile { name, bytes } in texture.export(&request.name, target)? {
+        for ExportFile { name, bytes } in export(&request.name, &program, target)? {
             let path = request.folder.join(name);
             match files.iter().find(|(_, other, _)| *other == path) {
                 None => files.push((target, path, bytes)),
