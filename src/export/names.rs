@@ -1,6 +1,6 @@
-//! Names that every language takes.
+//! Names that every language takes, and that the exports do not use themselves.
 
-/// Words that people give to textures and maps, and that a language keeps for itself.
+/// Words that people may give to textures and maps, and that a language or an export keeps for itself.
 const TAKEN: &[&str] = &[
     "active",
     "alias",
@@ -180,4 +180,31 @@ pub(super) fn fields(names: impl Iterator<Item = String>) -> Vec<String> {
         out.extend(free);
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_made_fit() {
+        for (name, expected) in [
+            ("granite", "granite"),
+            ("Old  wall.2", "Old_wall_2"),
+            ("__a__b__", "a_b"),
+            ("2 bricks", "map_2_bricks"),
+            ("gl_Position", "map_gl_Position"),
+            ("Texture", "Texture_map"),
+            ("\u{e9}\u{e8}", "map"),
+            ("", "map"),
+        ] {
+            assert_eq!(identifier(name, "map"), expected);
+        }
+    }
+
+    #[test]
+    fn no_name_comes_twice() {
+        let names = ["a", "b", "a", "a_2", "a"].map(str::to_owned);
+        assert_eq!(fields(names.into_iter()), ["a", "b", "a_2", "a_2_2", "a_3"]);
+    }
 }

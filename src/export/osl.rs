@@ -53,7 +53,7 @@ pub(super) fn osl(name: &str, program: &Program) -> Vec<ExportFile> {
     let [width, height] = program.size;
     let _ = write!(
         text,
-        "// UV: texture coordinates, v goes up; 1 is as wide as the photo.\n\
+        "// UV: texture coordinates, v goes up; the unit square shows what the photo showed.\n\
          // Scale: how many photos to 1. Footprint: distance of samples in pixels of the photo, 0 for no\n\
          // antialiasing. Contrast: 1 as in the photo. LinearLight: 1 for sRGB colors as linear light.\n\
          shader {name}(\n    point UV = point(u, v, 0),\n    float Scale = 1,\n    float Footprint = 0,\n    \
@@ -75,7 +75,7 @@ pub(super) fn osl(name: &str, program: &Program) -> Vec<ExportFile> {
     }
     let _ = write!(
         text,
-        "    float x = UV[0] * Scale * {width};\n    float y = -UV[1] * Scale * {height};\n    \
+        "    float x = UV[0] * Scale * {width};\n    float y = (1 - UV[1] * Scale) * {height};\n    \
          float footprint = Footprint;\n    float contrast = Contrast;\n{}{lines}}}\n",
         OSL.body(name, program)
     );

@@ -136,3 +136,99 @@ impl Program {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::method::noise::{Document, KNOTS};
+
+    /// What the doc comment of [`Program`] says, word by word.
+    fn by_its_words(program: &Program, [x, y]: [f64; 2], footprint: f64) -> Vec<f64> {
+        let [c, s] = program.turn.unwrap_or([1.0, 0.0]);
+        let (x, y) = (c * x + s * y, c * y - s * x);
+        let channel = |channel: &ProgramChannel| {
+            let (mut noise, mut lost) = (0.0, 0.0);
+            for (t, term) in program.terms.iter().enumerate() {
+                let finest = f64::from(term.levels[0].min(term.levels[1]));
+                let e = (1.0 + finest - footprint.log2()).clamp(0.0, 1.0);
+                let kept = e * e * (3.0 - 2.0 * e);
+                let at = |v: f64, axis: usize| {
+                    let offset = f64::from(channel.offsets[t][axis]);
+                    (v - 0.5 + offset) / 2f64.powi(term.levels[axis] as i32)
+                };
+                let (integers, scale) = &program.tiles[term.tile];
+                let surface = surface(integers, at(x, 0), at(y, 1)) * f64::from(*scale);
+                noise += f64::from(channel.weights[t]) * kept * surface;
+                lost += f64::from(channel.shares[t]) * (1.0 - kept * kept);
+            }
+            let Some(pieces) = &channel.shape else { return noise };
+            let at = |u: f64| {
+                let u = u.clamp(KNOTS[0], KNOTS[KNOTS.len() - 1]);
+                let (knot, [c0, c1, c2, c3, r]) =
+                    pieces.iter().rev().find(|p| u >= f64::from(p.0)).unwrap_or(&pieces[0]);
+                let t = (u - f64::from(*knot)) * f64::from(*r);
+                [c1, c2, c3]
+                    .iter()
+                    .zip(1..)
+                    .fold(f64::from(*c0), |sum, (c, n)| sum + f64::from(**c) * t.powi(n))
+            };
+            let (u, d) = (noise * f64::from(channel.per_deviation), lost.sqrt());
+            let side = 3f64.sqrt() * d;
+            (at(u - side) + at(u + side)) / 6.0 + at(u) * 2.0 / 3.0
+        };
+        let channels: Vec<f64> = program.channels.iter().map(channel).collect();
+        let output = |(mean, row): (&f32, &Vec<f32>)| {
+            let sum: f64 = row.iter().zip(&channels).map(|(m, c)| f64::from(*m) * c).sum();
+            f64::from(*mean) + sum
+        };
+        program.mean.iter().zip(&program.matrix).map(output).collect()
+    }
+
+    /// The sum over all coefficients near by, each with its spline.
+    fn surface(integers: &[i16], x: f64, y: f64) -> f64 {
+        let spline = |d: f64| match d.abs() {
+            d if d < 0.5 => 0.75 - d * d,
+            d if d < 1.5 => 0.5 * (1.5 - d).powi(2),
+            _ => 0.0,
+        };
+        let around = |i: i64| i.rem_euclid(Torus::SIDE as i64) as usize;
+        let mut sum = 0.0;
+        for j in y.floor() as i64 - 2..=y.floor() as i64 + 2 {
+            for i in x.floor() as i64 - 2..=x.floor() as i64 + 2 {
+                let coefficient = f64::from(integers[around(j) * Torus::SIDE + around(i)]);
+                sum += coefficient * spline(x - i as f64) * spline(y - j as f64);
+            }
+        }
+        sum
+    }
+
+    #[test]
+    fn its_words_give_the_evaluators_values() {
+        let head = r#"{"format":"texforge-noise","version":1,"seed":7,"size":[99,70],"maps":[{"name":"a","kind":"color","encoding":"srgb","channels":3}],"mean":[0.5,0.4,0.3],"matrix":[[0.8,0.5],[0.5,-0.7],[0.3,0.2]],"model":"#;
+        let rest = r#","score":{"fit":1,"recommended":"none"}}"#;
+        let histogram = "[-0.3,-0.28,-0.2,-0.1,-0.05,0,0.02,0.05,0.1,0.3,0.4]";
+        let channels = format!(
+            r#""channels":[{{"weights":[0.1,0.1,0.2],"histogram":{histogram}}},{{"weights":[0.1,0,0.1]}}]"#
+        );
+        let oriented = r#""oriented":{"angle":30,"bands":[{"levels":[0,0],"parts":["fine","fine"]},{"levels":[5,1],"parts":["low","band"]},{"levels":[1,3],"parts":["band","low"]}],"#;
+        for model in [r#""wavelet":{"bands":"round","#, r#""wavelet":{"bands":"square","#, oriented]
+        {
+            let text = format!("{head}{{{model}{channels}}}}}{rest}");
+            let evaluator = Evaluator::new(Document::from_json(&text).expect("valid"));
+            let program = Program::new(&evaluator);
+            for i in 0..300 {
+                let point = [f64::from(i) * 7.31 - 900.0, f64::from(i * i % 101) * 3.7];
+                for footprint in [1.0, 1.6, 3.1, 100.0] {
+                    let mut out = [0.0; 3];
+                    let filter = Filter { footprint, keep_contrast: false };
+                    evaluator.plane(&[point], filter, &mut out);
+                    let expected = by_its_words(&program, point, footprint);
+                    for (value, expected) in out.into_iter().zip(expected) {
+                        let error = (f64::from(value) - expected).abs();
+                        assert!(error < 1e-5, "{model} {point:?} {footprint}: {error}");
+                    }
+                }
+            }
+        }
+    }
+}

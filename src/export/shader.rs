@@ -35,10 +35,8 @@ pub(super) fn number(v: f32) -> String {
 
 impl Language {
     fn parameters(&self, parameters: &[(&str, &str)]) -> String {
-        let one = |(ty, name): &(&str, &str)| match (self.name_first, name.split_once('[')) {
-            (true, _) => format!("{name}: {ty}"),
-            // An array: `int tile[32768]`.
-            (false, _) => format!("{ty} {name}"),
+        let one = |(ty, name): &(&str, &str)| {
+            if self.name_first { format!("{name}: {ty}") } else { format!("{ty} {name}") }
         };
         parameters.iter().map(one).collect::<Vec<_>>().join(", ")
     }
@@ -413,8 +411,8 @@ pub(super) fn heading(name: &str, program: &Program, tile: &str) -> String {
     };
     format!(
         "// {name}: a procedural texture, written by texforge from a photo of {width} x {height} pixels.\n\
-         // It never ends and never repeats visibly; coordinates are in pixels of that photo. A float\n\
-         // keeps them to 1/4000 pixel within 4096 pixels of the origin, to 1/16 within a million.\n\
+         // It has no end; coordinates are in pixels of that photo. A float keeps them to 1/4000 of a pixel\n\
+         // within 4096 pixels of the origin, to 1/16 within a million.\n\
          {again}{tile}\n"
     )
 }
