@@ -8,7 +8,7 @@ use pyo3::types::{PyByteArray, PyBytes};
 use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
 use crate::base::params::Value as _;
-use crate::export::Target;
+use crate::export::{Target, export};
 use crate::image::io;
 use crate::image::mask::Mask;
 use crate::method::noise::Filter;
@@ -235,7 +235,7 @@ impl Noise {
             .ok_or_else(|| Error::parameter("target", Target::expected(), format!("`{target}`")))
             .into_py(py)?;
         let texture = self.0.clone();
-        let files = enter::unheard(py, move || texture.export(&name, target))?;
+        let files = enter::unheard(py, move || export(&name, &texture.program(), target))?;
         Ok(files.into_iter().map(|f| (f.name, PyBytes::new(py, &f.bytes))).collect())
     }
 }

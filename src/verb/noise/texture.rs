@@ -9,7 +9,7 @@ use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
 use crate::base::memory::ensure_available;
 use crate::base::params::Value as _;
-use crate::export::{ExportFile, Program, Target, export};
+use crate::export::Program;
 use crate::image::material::MapKind;
 use crate::image::picture::{Encoding, Picture, Sample as _, Samples};
 use crate::method::noise::raster::{self, View};
@@ -87,13 +87,9 @@ impl NoiseTexture {
         self.evaluator.document()
     }
 
-    /// The texture as files for another program; `name` names them and the functions in them, with `_` for
-    /// what cannot stand in a name.
-    ///
-    /// # Errors
-    /// Those of [`export`](crate::export::export()).
-    pub fn export(&self, name: &str, target: Target) -> Result<Vec<ExportFile>> {
-        export(name, &Program::new(&self.evaluator), target)
+    /// The numbers that a shader needs to compute it.
+    pub fn program(&self) -> Program {
+        Program::new(&self.evaluator)
     }
 
     /// Number of channels of a value: those of all maps, one after the other.
