@@ -16,6 +16,7 @@ from texforge._errors import ParameterError
 from texforge._progress import reporting
 from texforge._types import (
     Bands,
+    Directions,
     Encoding,
     ExportTarget,
     Histogram,
@@ -41,6 +42,7 @@ _MOST_SIDE = 65536
 def fit_noise(
     image: ImageLike,
     *,
+    directions: Directions = "auto",
     bands: Bands = "round",
     weights: Weights = "corrected",
     histogram: Histogram = "kept",
@@ -63,9 +65,13 @@ def fit_noise(
     image : (H, W) or (H, W, C) array_like, or Pillow image
         The photo, of at least 16 x 16 pixels and of any type that `tile` takes. Pixels that are not
         wholly opaque do not count. It becomes the map ``"basecolor"``.
+    directions : {"auto", "isotropic", "oriented"}
+        Which noise is fitted: isotropic is alike in all directions (the paper's kind); oriented has
+        bands that differ along two directions, for wood and the like; auto takes what suits the
+        photo.
     bands : {"round", "square"}
-        The shape of the bands in the spectrum: round is alike in all directions; square is the
-        paper's, Cook and DeRose's wavelet noise, and looks a little woven.
+        The shape of isotropic noise's bands in the spectrum: round is alike in all directions;
+        square is the paper's, Cook and DeRose's wavelet noise, and looks a little woven.
     weights : {"corrected", "direct"}
         How the bands' weights follow from the photo's spectrum: corrected takes into account what
         each band leaks into others; direct is the paper's formula, which does not.
@@ -289,7 +295,7 @@ class NoiseTexture:
 
     @property
     def recommended(self) -> str:
-        """What fits the photo best: ``"wavelet"``, ``"oriented"``, ``"tiling"`` or ``"none"``."""
+        """What fits the photo best: ``"wavelet"``, ``"oriented"`` or ``"none"``."""
         recommended: str = self.document["score"]["recommended"]
         return recommended
 

@@ -26,6 +26,7 @@ __all__ = [
     "Axis",
     "Bands",
     "Costs",
+    "Directions",
     "Encoding",
     "ExportTarget",
     "Follow",
@@ -84,6 +85,8 @@ Matching: TypeAlias = Literal["color"] | Literal["correlation"]
 """By what a piece for a gap is chosen."""
 Seam: TypeAlias = Literal["graph"] | Literal["cut"] | Literal["linear"]
 """How pieces are joined."""
+Directions: TypeAlias = Literal["auto"] | Literal["isotropic"] | Literal["oriented"]
+"""Which noise is fitted."""
 Bands: TypeAlias = Literal["round"] | Literal["square"]
 """The shape of a noise's bands in the spectrum."""
 Weights: TypeAlias = Literal["corrected"] | Literal["direct"]

@@ -92,7 +92,7 @@ def test_it_knows_what_it_is(material: texforge.NoiseTexture) -> None:
     }
     assert material.seed == 0
     assert 0 <= material.score <= 1
-    assert material.recommended in ("wavelet", "oriented", "tiling", "none")
+    assert material.recommended in ("wavelet", "oriented", "none")
     assert material.document["maps"][1] == {
         "name": "height",
         "kind": "data",
