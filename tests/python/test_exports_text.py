@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from PIL import Image
-
 import texforge
+from PIL import Image
 
 from .noise_exports import ORIENTED, textures
 from .shaders import (
@@ -130,7 +129,7 @@ def test_any_name_and_number_of_channels(target: str) -> None:
     count = sum(channels for _, channels in MAPS)
     document = json.loads(json.dumps(ORIENTED))
     document["maps"] = [
-        {"name": name, "kind": "data", "encoding": "data", "channels": channels}
+        {"name": name, "kind": "color", "encoding": "srgb", "channels": channels}
         for name, channels in MAPS
     ]
     document["mean"] = [0.05 * i for i in range(count)]
@@ -143,8 +142,6 @@ def test_any_name_and_number_of_channels(target: str) -> None:
         files = texture.export(target, name=given)  # type: ignore[arg-type]
         for which, (start, end) in enumerate(zip(starts, [*starts[1:], count], strict=True)):
             read = shown(files, target, name, which=which)
-            np.testing.assert_allclose(
-                read[..., : end - start], wanted[..., start:end], atol=5e-5
-            )
+            np.testing.assert_allclose(read[..., : end - start], wanted[..., start:end], atol=5e-5)
             if given != "float":
                 break
