@@ -4,6 +4,8 @@
 //! draws the coefficients of cubic splines, which Blender can look up: with 3 samples to a coefficient the
 //! error of a band is 0.3 to 0.4 % of its amplitude.
 
+use std::fmt::Write as _;
+
 use serde_json::{Value, json};
 
 use super::nodes::{Group, Nodes, TOGETHER};
@@ -56,13 +58,15 @@ normals in the world's directions. Run again, it makes the group anew; materials
 "#
     );
     for (key, value) in numbers {
-        text += &format!("        \"{key}\": {value},\n");
+        // Into a string: that does not fail.
+        let _ = writeln!(text, "        \"{key}\": {value},");
     }
     text += "        \"tiles\": [\n";
     for (integers, scale) in &program.tiles {
         let lines = packed(integers);
-        text += &format!(
-            "            {{\"scale\": {scale}, \"coefficients\": \"\"\"\n{lines}\"\"\"}},\n"
+        let _ = writeln!(
+            text,
+            "            {{\"scale\": {scale}, \"coefficients\": \"\"\"\n{lines}\"\"\"}},"
         );
     }
     text += "        ],\n    }\n)\n";

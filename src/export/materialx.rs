@@ -1,4 +1,4 @@
-//! MaterialX: a graph of standard nodes, a material that uses it, and the pictures that it reads.
+//! `MaterialX`: a graph of standard nodes, a material that uses it, and the pictures that it reads.
 
 use std::collections::HashSet;
 use std::fmt::Write as _;
@@ -28,7 +28,7 @@ pub(super) fn materialx(program: &Program, name: &str) -> Result<Vec<ExportFile>
         .into_iter()
         .zip(&nodes.groups)
         .map(|(sum, group)| match &group.shape {
-            Some(shape) => graph.shaped(sum, shape),
+            Some(shape) => graph.shaped(&sum, shape),
             None => sum,
         })
         .collect();
@@ -231,23 +231,19 @@ impl Graph {
     }
 
     /// The histograms of a group of channels applied to its noise.
-    fn shaped(&mut self, noise: Node, shape: &GroupShape) -> Node {
+    fn shaped(&mut self, noise: &Node, shape: &GroupShape) -> Node {
         let base = self.channels(&shape.base);
-        let mut sum = match &shape.straight {
-            Some(straight) => {
-                let straight = self.channels(straight);
-                let kept = self.two("multiply", "straight", &noise, In::Numbers(&straight));
-                self.two("add", "histogram", &kept, In::Numbers(&base))
-            }
-            None => {
-                let inputs = [("value", In::Numbers(&base))];
-                self.node("constant", noise.kind, "histogram", &inputs)
-            }
+        let mut sum = if let Some(straight) = &shape.straight {
+            let straight = self.channels(straight);
+            let kept = self.two("multiply", "straight", noise, In::Numbers(&straight));
+            self.two("add", "histogram", &kept, In::Numbers(&base))
+        } else {
+            self.node("constant", noise.kind, "histogram", &[("value", In::Numbers(&base))])
         };
         for (i, (knot, width, coefficients)) in shape.pieces.iter().enumerate() {
             let name = |what: &str| format!("histogram{i}_{what}");
             let [c1, c2, c3] = coefficients.each_ref().map(|c| self.channels(c));
-            let from = self.two("subtract", &name("from"), &noise, In::Number(*knot));
+            let from = self.two("subtract", &name("from"), noise, In::Number(*knot));
             let inputs =
                 [("in", In::Node(&from)), ("low", In::Number(0.0)), ("high", In::Number(*width))];
             let t = self.node("clamp", noise.kind, &name("t"), &inputs);

@@ -32,7 +32,7 @@ choice! {
         Hlsl = "hlsl",
         /// Open Shading Language: Blender's Cycles and other renderers.
         Osl = "osl",
-        /// MaterialX: Houdini, Maya, Unreal, USD.
+        /// `MaterialX`: Houdini, Maya, Unreal, USD.
         Materialx = "materialx",
         /// A Python script that builds a node group in Blender, for Eevee and Cycles.
         Blender = "blender",

@@ -176,9 +176,9 @@ mod tests {
             for (k, shift) in shifts.iter().enumerate() {
                 let Some(channel) = program.channels.get(first + k) else { continue };
                 for (t, term) in program.terms.iter().enumerate() {
-                    for axis in 0..2 {
+                    for (axis, by) in shift.iter().enumerate() {
                         let period = (Torus::SIDE as u32) << term.levels[axis];
-                        let moved = (shift[axis] as u32) << term.levels[axis];
+                        let moved = (*by as u32) << term.levels[axis];
                         let expected = program.channels[first].offsets[t][axis] + moved;
                         assert_eq!(channel.offsets[t][axis], expected % period, "{k} {t} {axis}");
                     }
@@ -192,7 +192,7 @@ mod tests {
         let (program, histogram) = program();
         let group = &Nodes::new(&program, 3).groups[0];
         let exact = Shape::new(&std::array::from_fn(|i| histogram[i]));
-        let shape = group.shape.as_ref().unwrap();
+        let shape = group.shape.as_ref().expect("histograms");
         for i in -40..=40 {
             let u = 0.1 * f64::from(i);
             let value = |k: usize| {
