@@ -42,19 +42,18 @@ pub(super) fn glsl(name: &str, program: &Program, es: bool) -> Result<Vec<Export
 
 fn example(name: &str, outputs: &[Output]) -> String {
     let returned = GLSL.returned(name, outputs);
-    let (uniform, shown) = match outputs {
-        [one] => (String::new(), format!("    color = {};\n", GLSL.shown(one, "texture_here"))),
-        _ => {
-            let line = |(i, o): (usize, &Output)| {
-                let value = GLSL.shown(o, &format!("texture_here.{}", o.name));
-                format!("    if (shown == {i}) {{ color = {value}; }}\n")
-            };
-            let lines: String = outputs.iter().enumerate().map(line).collect();
-            (
-                "uniform int shown; // which of the maps\n".into(),
-                format!("    color = vec4(0.0);\n{lines}"),
-            )
-        }
+    let (uniform, shown) = if let [one] = outputs {
+        (String::new(), format!("    color = {};\n", GLSL.shown(one, "texture_here")))
+    } else {
+        let line = |(i, o): (usize, &Output)| {
+            let value = GLSL.shown(o, &format!("texture_here.{}", o.name));
+            format!("    if (shown == {i}) {{ color = {value}; }}\n")
+        };
+        let lines: String = outputs.iter().enumerate().map(line).collect();
+        (
+            "uniform int shown; // which of the maps\n".into(),
+            format!("    color = vec4(0.0);\n{lines}"),
+        )
     };
     format!(
         "

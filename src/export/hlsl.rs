@@ -41,19 +41,17 @@ pub(super) fn hlsl(name: &str, program: &Program) -> Result<Vec<ExportFile>> {
 
 fn example(name: &str, outputs: &[Output]) -> String {
     let returned = HLSL.returned(name, outputs);
-    let (uniform, shown) = match outputs {
-        [one] => (String::new(), format!("    return {};\n", HLSL.shown(one, "texture_here"))),
-        _ => {
-            let line = |(i, o): (usize, &Output)| {
-                let value = HLSL.shown(o, &format!("texture_here.{}", o.name));
-                format!("    if (shown == {i}) {{ color = {value}; }}\n")
-            };
-            let lines: String = outputs.iter().enumerate().map(line).collect();
-            let shown = format!(
-                "    float4 color = float4(0.0, 0.0, 0.0, 0.0);\n{lines}    return color;\n"
-            );
-            ("int shown; // which of the maps\n".into(), shown)
-        }
+    let (uniform, shown) = if let [one] = outputs {
+        (String::new(), format!("    return {};\n", HLSL.shown(one, "texture_here")))
+    } else {
+        let line = |(i, o): (usize, &Output)| {
+            let value = HLSL.shown(o, &format!("texture_here.{}", o.name));
+            format!("    if (shown == {i}) {{ color = {value}; }}\n")
+        };
+        let lines: String = outputs.iter().enumerate().map(line).collect();
+        let shown =
+            format!("    float4 color = float4(0.0, 0.0, 0.0, 0.0);\n{lines}    return color;\n");
+        ("int shown; // which of the maps\n".into(), shown)
     };
     format!(
         "

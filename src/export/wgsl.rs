@@ -36,16 +36,15 @@ pub(super) fn wgsl(name: &str, program: &Program) -> Result<Vec<ExportFile>> {
 }
 
 fn example(name: &str, outputs: &[Output]) -> String {
-    let shown = match outputs {
-        [one] => format!("    return {};\n", WGSL.shown(one, "texture_here")),
-        _ => {
-            let line = |(i, o): (usize, &Output)| {
-                let value = WGSL.shown(o, &format!("texture_here.{}", o.name));
-                format!("    if (view.shown == {i}u) {{ return {value}; }}\n")
-            };
-            let lines: String = outputs.iter().enumerate().map(line).collect();
-            format!("{lines}    return vec4<f32>();\n")
-        }
+    let shown = if let [one] = outputs {
+        format!("    return {};\n", WGSL.shown(one, "texture_here"))
+    } else {
+        let line = |(i, o): (usize, &Output)| {
+            let value = WGSL.shown(o, &format!("texture_here.{}", o.name));
+            format!("    if (view.shown == {i}u) {{ return {value}; }}\n")
+        };
+        let lines: String = outputs.iter().enumerate().map(line).collect();
+        format!("{lines}    return vec4<f32>();\n")
     };
     format!(
         "
