@@ -49,7 +49,7 @@ pub struct ExportFile {
 }
 
 /// The files of a texture for a target. `texture_name` names them and the functions in them, with `_`
-/// for what cannot stand in a name.
+/// for what cannot stand in a name, and `_texture` behind a word that a language keeps for itself.
 ///
 /// The same program gives the same bytes.
 ///
@@ -57,13 +57,14 @@ pub struct ExportFile {
 /// [`Error::Format`](crate::Error::Format) if a picture cannot be written, which would be a bug.
 pub fn export(texture_name: &str, program: &Program, target: Target) -> Result<Vec<ExportFile>> {
     let name = &names::identifier(texture_name, "texture");
+    let plain = &names::plain(texture_name, "texture");
     match target {
         Target::Glsl => glsl::glsl(name, program, false),
         Target::GlslEs => glsl::glsl(name, program, true),
         Target::Wgsl => wgsl::wgsl(name, program),
         Target::Hlsl => hlsl::hlsl(name, program),
         Target::Osl => Ok(osl::osl(name, program)),
-        Target::Materialx => materialx::materialx(program, name),
-        Target::Blender => Ok(blender::blender(program, name)),
+        Target::Materialx => materialx::materialx(program, plain),
+        Target::Blender => Ok(blender::blender(program, plain)),
     }
 }

@@ -149,8 +149,8 @@ const TAKEN: &[&str] = &[
     "max",
 ];
 
-/// A name of letters, digits and single underscores; `what` follows where it would be none or is taken.
-pub(super) fn identifier(name: &str, what: &str) -> String {
+/// The letters, digits and single underscores of a name; `what` if there are none.
+pub(super) fn plain(name: &str, what: &str) -> String {
     let mut out = String::new();
     for c in name.chars() {
         if c.is_ascii_alphanumeric() {
@@ -159,15 +159,21 @@ pub(super) fn identifier(name: &str, what: &str) -> String {
             out.push('_');
         }
     }
-    let mut out = out.trim_end_matches('_').to_owned();
-    if out.is_empty() || TAKEN.contains(&out.to_lowercase().as_str()) {
-        out = if out.is_empty() { what.to_owned() } else { format!("{out}_{what}") };
+    let out = out.trim_end_matches('_');
+    if out.is_empty() { what.to_owned() } else { out.to_owned() }
+}
+
+/// A name for functions and variables; `what` stands beside it where it would be taken.
+pub(super) fn identifier(name: &str, what: &str) -> String {
+    let out = plain(name, what);
+    if TAKEN.contains(&out.to_lowercase().as_str()) {
+        format!("{out}_{what}")
+    } else if out.starts_with(|c: char| c.is_ascii_digit()) || out.starts_with("gl_") {
+        // A digit, or what OpenGL keeps.
+        format!("{what}_{out}")
+    } else {
+        out
     }
-    // A digit, or what OpenGL keeps.
-    if out.starts_with(|c: char| c.is_ascii_digit()) || out.starts_with("gl_") {
-        out = format!("{what}_{out}");
-    }
-    out
 }
 
 /// The same names, none of them twice.

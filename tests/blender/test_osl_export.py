@@ -41,6 +41,12 @@ def exports(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def shader(exports: Path, name: str) -> Path:
+    # Named after the texture, but that `color` is a word of OSL.
+    (file,) = (exports / name).glob(f"{name}*.osl")
+    return file
+
+
 @pytest.mark.parametrize(("name", "output"), MAPS)
 def test_maps_are_ours(exports: Path, name: str, output: str) -> None:
     arrays = [a for a in sorted((exports / name).glob(f"{output}-*.npy")) if a.stem[-1].isdigit()]
@@ -48,7 +54,7 @@ def test_maps_are_ours(exports: Path, name: str, output: str) -> None:
     for array in arrays:
         wanted = np.load(array)
         read = render_osl(
-            exports / name / f"{name}.osl",
+            shader(exports, name),
             wanted.shape[:2],
             {"LinearLight": 0},
             coordinate="UV",
@@ -61,7 +67,7 @@ def test_contrast_and_linear_light(exports: Path) -> None:
     wanted = np.load(exports / "color" / "basecolor-contrast.npy")
     light = np.where(wanted <= 0.04045, wanted / 12.92, ((wanted + 0.055) / 1.055) ** 2.4)
     read = render_osl(
-        exports / "color" / "color.osl",
+        shader(exports, "color"),
         wanted.shape[:2],
         {"Contrast": 0.5},
         coordinate="UV",

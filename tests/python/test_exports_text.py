@@ -129,7 +129,7 @@ def test_any_name_and_number_of_channels(target: str) -> None:
     count = sum(channels for _, channels in MAPS)
     document = json.loads(json.dumps(ORIENTED))
     document["maps"] = [
-        {"name": name, "kind": "data", "encoding": "data", "channels": channels}
+        {"name": name, "kind": "color", "encoding": "srgb", "channels": channels}
         for name, channels in MAPS
     ]
     document["mean"] = [0.05 * i for i in range(count)]
