@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -85,11 +85,13 @@ def expected(
     values = values.reshape(*size, -1)[..., texture.channels[name]]
     if name == "normal_dx":
         vectors: Values = (2 * values - 1) * (1, -1, 1)
-        return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.clip(values, 0, 1)
+        upright: Values = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+        return upright
+    clipped: Values = np.clip(values, 0, 1)
+    return clipped
 
 
-def main(target: str, folder: Path) -> None:
+def main(target: texforge.ExportTarget, folder: Path) -> None:
     """Write for each texture its export, and for each of its maps and sizes an array."""
     for name, texture in textures().items():
         place = folder / name
@@ -104,4 +106,4 @@ def main(target: str, folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], Path(sys.argv[2]))
+    main(cast("texforge.ExportTarget", sys.argv[1]), Path(sys.argv[2]))
