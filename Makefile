@@ -101,7 +101,7 @@ readme-pictures: setup ## Make the README's pictures anew, in docs/pictures/.
 	$(BIN)/python docs/readme_pictures.py
 
 bench: ## Measure the kernels.
-	$(CARGO) bench --locked --bench kernels --bench representative --bench regular
+	$(CARGO) bench --locked --bench kernels --bench representative --bench regular --bench noise
 
 bench-peers: $(BIN)/.ready ## Compare with G'MIC and texture-synthesis (PHOTO=file, BENCH="--large ...").
 	$(BIN)/python benches/peers.py $(if $(PHOTO),"$(PHOTO)") $(BENCH)
