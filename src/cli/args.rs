@@ -372,6 +372,10 @@ mod tests {
         let mut all = command();
         let mut waiting: Vec<_> = all.get_subcommands_mut().collect();
         while let Some(sub) = waiting.pop() {
+            // What clap adds to a command with commands of its own.
+            if sub.get_name() == "help" {
+                continue;
+            }
             let help = sub.render_long_help().to_string();
             assert!(help.starts_with("Examples:"), "{help}");
             waiting.extend(sub.get_subcommands_mut());

@@ -14,8 +14,8 @@ use crate::signal::wavelet_noise::spectrum::{along_axis, octave};
 /// Directions nearer to an axis than this, in degrees, are the axis: then pictures can go round.
 const UPRIGHT: f64 = 2.0;
 
-/// The weakest bands, which together have less than this share of the power, are left out.
-const LEFT_OUT: f64 = 0.02;
+/// The least visible bands, which together have less than this share of all, are left out.
+const LEFT_OUT: f64 = 0.01;
 
 /// At most so many bands: every one costs time wherever the texture is evaluated.
 const MOST_BANDS: usize = 24;
@@ -56,16 +56,20 @@ pub fn fit(analysis: &Analysis, shape: (usize, usize)) -> Oriented {
             pairs.iter().map(|b| chosen.iter().map(|j| entry(b, j)).collect()).collect();
         powers.par_iter().map(|p| least_squares(&matrix, p, 0.01)).collect()
     };
-    // Bands in the order of their power in all channels, until nearly all of it is there.
+    // Bands in the order of what is seen of them in all channels, until nearly all of it is there: their
+    // contrast, and the finer the more, as fine grain is weak beside shades and yet what makes wood wood.
     let all = solve(&pairs);
-    let power = |i: usize| all.iter().map(|squares| squares[i]).sum::<f64>();
-    let total: f64 = (0..pairs.len()).map(power).sum();
+    let seen = |i: usize| {
+        let finest = pairs[i][0].min(pairs[i][1]);
+        all.iter().map(|squares| squares[i]).sum::<f64>() / f64::from(1u32 << finest)
+    };
+    let total: f64 = (0..pairs.len()).map(seen).sum();
     let mut order: Vec<usize> = (0..pairs.len()).collect();
-    order.sort_by(|&a, &b| power(b).total_cmp(&power(a)));
+    order.sort_by(|&a, &b| seen(b).total_cmp(&seen(a)));
     let mut left = total;
     let enough = |&i: &usize| {
         let go_on = left > LEFT_OUT * total;
-        left -= power(i);
+        left -= seen(i);
         go_on
     };
     let mut chosen: Vec<usize> = order.into_iter().take_while(enough).take(MOST_BANDS).collect();
