@@ -1,7 +1,7 @@
 //! `texforge noise` as a user meets it: files, exit statuses, what is refused.
 
 use proptest::prelude::*;
-use texforge::{Ctx, NoiseTexture, RenderParams, Samples};
+use texforge::{Ctx, ErrorKind, NoiseTexture, RenderParams, Samples};
 
 use crate::support::{Folder, Pixels};
 
@@ -253,7 +253,13 @@ mod render {
             ("\"histogram\":[", "\"histogram\":[9.0,", "the histogram of"),
         ] {
             assert!(good.contains(from), "{from} is in {good}");
-            cases.push((good.replacen(from, to, 1).into_bytes(), needle));
+            let bad = good.replacen(from, to, 1);
+            // A name is only bad for files.
+            if !needle.contains("named after") {
+                let error = NoiseTexture::from_json(&bad).expect_err(to);
+                assert_eq!(error.kind(), ErrorKind::Document, "{error}");
+            }
+            cases.push((bad.into_bytes(), needle));
         }
         for (bytes, needle) in cases {
             std::fs::write(folder.at("bad.json"), bytes).expect("file");
