@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 
 use crate::method::noise::document::{Document, Model, Term};
 use crate::method::noise::shape::Shape;
-use crate::signal::wavelet_noise::spectrum::at_pixels;
+use crate::signal::wavelet_noise::spectrum::{ALIKE, at_pixels};
 use crate::signal::wavelet_noise::{Detail, Solid, Torus};
 
 /// How bands that a sample cannot hold are treated.
@@ -71,7 +71,12 @@ impl Evaluator {
             made.entry(t.detail).or_insert_with(|| Arc::new(Torus::new(side, t.detail))).clone()
         };
         let tori = terms.iter().map(&mut torus).collect();
-        let at_pixels: Vec<f64> = terms.iter().map(|t| at_pixels(t.detail, t.levels)).collect();
+        let mut known = HashMap::new();
+        let variance = |t: &Term| {
+            let levels = t.levels.map(|level| level.min(ALIKE));
+            *known.entry((t.detail, levels)).or_insert_with(|| at_pixels(t.detail, levels))
+        };
+        let at_pixels: Vec<f64> = terms.iter().map(variance).collect();
         let channels = document.channels().iter().enumerate().map(|(c, channel)| {
             let offset = |(t, term): (usize, &Term)| {
                 let [x, y] = term.levels;

@@ -18,7 +18,7 @@ const UPRIGHT: f64 = 2.0;
 const LEFT_OUT: f64 = 0.01;
 
 /// At most so many bands: every one costs time wherever the texture is evaluated.
-const MOST_BANDS: usize = 24;
+const MOST_BANDS: usize = 40;
 
 /// The result of [`fit`].
 #[derive(Debug, Clone, PartialEq)]
@@ -61,7 +61,7 @@ pub fn fit(analysis: &Analysis, shape: (usize, usize)) -> Oriented {
     let all = solve(&pairs);
     let seen = |i: usize| {
         let finest = pairs[i][0].min(pairs[i][1]);
-        all.iter().map(|squares| squares[i]).sum::<f64>() / f64::from(1u32 << finest)
+        all.iter().map(|squares| squares[i]).sum::<f64>() / f64::from(1u32 << finest).sqrt()
     };
     let total: f64 = (0..pairs.len()).map(seen).sum();
     let mut order: Vec<usize> = (0..pairs.len()).collect();

@@ -126,12 +126,15 @@ fn continuous(detail: Detail) -> f64 {
     (0..N * N).map(cell).sum::<f64>() / (N * N) as f64
 }
 
+/// From this level on, four pixels to a coefficient, [`at_pixels`] is taken to be the same.
+pub const ALIKE: u32 = 2;
+
 /// Variance, at the photo's pixels, of noise that has unit variance over all positions: the finest bands
 /// are stronger at coefficients than between them.
 pub fn at_pixels(detail: Detail, levels: [u32; 2]) -> f64 {
+    // So many coefficients tell all.
     const N: usize = 96;
-    // From four pixels to a coefficient on all are alike, and so many coefficients tell all.
-    let levels = levels.map(|level| level.min(2));
+    let levels = levels.map(|level| level.min(ALIKE));
     let [cols, rows] = levels.map(|level| N << level);
     let axes = [Axis::new(detail, levels[0], cols), Axis::new(detail, levels[1], rows)];
     // A part of the format: the analysis' window must not matter.
