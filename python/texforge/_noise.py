@@ -399,7 +399,7 @@ class NoiseTexture:
         tileable: bool = False,
         keep_contrast: bool = False,
         dtype: SampleType = "uint8",
-        map: str | None = None,  # noqa: A002 (what it is called everywhere)
+        map: str | None = None,  # noqa: A002 (as `--map` and `maps`)
         threads: int | None = None,
         progress: Progress = None,
     ) -> Image:
@@ -444,14 +444,23 @@ class NoiseTexture:
             If `progress` returned False.
         """
         names = self.maps
-        if map is None:
-            map = names[0]  # noqa: A001
-        elif map not in names:
+        chosen = names[0] if map is None else map
+        if chosen not in names:
             raise ParameterError(
                 f"`map` must be one of {', '.join(names)}, got {map!r}", fields={"name": "map"}
             )
-        given = (scale, origin, tileable, keep_contrast, dtype)
-        return self._render(map, size, *given, threads, progress)[map]
+        pictures = self._render(
+            chosen,
+            size,
+            scale=scale,
+            origin=origin,
+            tileable=tileable,
+            keep_contrast=keep_contrast,
+            dtype=dtype,
+            threads=threads,
+            progress=progress,
+        )
+        return pictures[chosen]
 
     def render_maps(
         self,
@@ -466,17 +475,27 @@ class NoiseTexture:
         progress: Progress = None,
     ) -> dict[str, Image]:
         """Make a picture of every map, by name: see `render`."""
-        given = (scale, origin, tileable, keep_contrast, dtype)
-        return self._render(None, size, *given, threads, progress)
+        return self._render(
+            None,
+            size,
+            scale=scale,
+            origin=origin,
+            tileable=tileable,
+            keep_contrast=keep_contrast,
+            dtype=dtype,
+            threads=threads,
+            progress=progress,
+        )
 
     def _render(
         self,
         only: str | None,
         size: int | tuple[int, int],
+        *,
         scale: float,
         origin: tuple[float, float],
-        tileable: bool,  # noqa: FBT001
-        keep_contrast: bool,  # noqa: FBT001
+        tileable: bool,
+        keep_contrast: bool,
         dtype: SampleType,
         threads: int | None,
         progress: Progress,
