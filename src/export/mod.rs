@@ -14,10 +14,10 @@ mod shader;
 mod tile;
 mod wgsl;
 
-use crate::base::error::Result;
-use crate::base::params::choice;
+use crate::base::error::{Error, Result};
+use crate::base::params::{Value as _, choice};
 
-pub use program::{Program, ProgramChannel, ProgramTerm};
+pub use program::{Program, ProgramChannel, ProgramTerm, ProgramTiling};
 
 choice! {
     /// A language or a program that a texture is written for.
@@ -58,6 +58,10 @@ pub struct ExportFile {
 pub fn export(texture_name: &str, program: &Program, target: Target) -> Result<Vec<ExportFile>> {
     let name = &names::identifier(texture_name, "texture");
     let plain = &names::plain(texture_name, "texture");
+    if program.tiling.is_some() {
+        let expected = "a target that can tile and blend, of which there is none yet";
+        return Err(Error::parameter("target", expected, target.show()));
+    }
     match target {
         Target::Glsl => glsl::glsl(name, program, false),
         Target::GlslEs => glsl::glsl(name, program, true),

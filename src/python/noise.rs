@@ -220,7 +220,7 @@ impl Noise {
             edit.params.set(name, text).into_py(py)?;
         }
         let texture = self.0.clone();
-        enter::unheard(py, move || texture.edit(&edit)).map(Self)
+        enter::unheard(py, move || texture.edit(&Ctx::new(0, 0)?, &edit)).map(Self)
     }
 
     /// Files of the texture for a target, by name.

@@ -7,6 +7,7 @@ use clap::{Arg, ArgAction, ArgMatches, Command, value_parser};
 use serde_json::{Value, json};
 
 use super::{about, document, output, path, read, shown, target, write};
+use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
 use crate::cli::args;
 use crate::cli::output::Target;
@@ -131,7 +132,7 @@ pub(super) fn edit(matches: &ArgMatches) -> Result<()> {
             Error::Parameter { name: "means", .. } => about("mean", error),
             error => error,
         };
-        textures[0].edit(&edit).map_err(named)
+        textures[0].edit(&Ctx::new(0, 0)?, &edit).map_err(named)
     })
 }
 

@@ -5,6 +5,8 @@ use serde::{Deserialize, Serialize};
 use crate::base::error::{Error, Result};
 use crate::image::material::MapKind;
 use crate::method::noise::shape::KNOTS;
+use crate::method::noise::tiling::Layout;
+use crate::signal::wavelet_noise::spectrum::at_pixels;
 use crate::signal::wavelet_noise::{Detail, Part, Torus, hash};
 
 /// What the field `format` of a document says.
@@ -85,6 +87,13 @@ pub enum Model {
         /// Every channel, with a weight for each band.
         channels: Vec<Channel>,
     },
+    /// Parts of the photo, blended.
+    Tiling {
+        /// How.
+        layout: Layout,
+        /// Every channel; its one weight is its standard deviation.
+        channels: Vec<Channel>,
+    },
 }
 
 /// The shape of isotropic bands in the spectrum.
@@ -143,7 +152,7 @@ pub struct Channel {
 pub struct Score {
     /// How well this texture fits the photo.
     pub fit: f64,
-    /// `wavelet`, `oriented` or `none`: what fits it best.
+    /// `wavelet`, `oriented`, `tiling` or `none`: what fits it best.
     pub recommended: String,
 }
 
@@ -227,18 +236,22 @@ impl Document {
     /// The independent channels.
     pub fn channels(&self) -> &[Channel] {
         match &self.model {
-            Model::Wavelet { channels, .. } | Model::Oriented { channels, .. } => channels,
+            Model::Wavelet { channels, .. }
+            | Model::Oriented { channels, .. }
+            | Model::Tiling { channels, .. } => channels,
         }
     }
 
     /// The independent channels.
     pub(super) fn channels_mut(&mut self) -> &mut [Channel] {
         match &mut self.model {
-            Model::Wavelet { channels, .. } | Model::Oriented { channels, .. } => channels,
+            Model::Wavelet { channels, .. }
+            | Model::Oriented { channels, .. }
+            | Model::Tiling { channels, .. } => channels,
         }
     }
 
-    /// The terms that [`Channel::weights`] weigh.
+    /// The terms that [`Channel::weights`] weigh; none of a texture that is tiled.
     pub fn terms(&self) -> Vec<Term> {
         match &self.model {
             Model::Wavelet { bands, channels } => {
@@ -246,6 +259,15 @@ impl Document {
                 levels.map(|level| bands.term(level)).collect()
             }
             Model::Oriented { bands, .. } => bands.iter().map(Band::term).collect(),
+            Model::Tiling { .. } => Vec::new(),
+        }
+    }
+
+    /// Variance at the photo's pixels of what each weight of a channel weighs, with weight 1.
+    pub(super) fn variances(&self) -> Vec<f64> {
+        match self.model {
+            Model::Tiling { .. } => vec![1.0],
+            _ => self.terms().iter().map(|term| at_pixels(term.detail, term.levels)).collect(),
         }
     }
 
@@ -315,13 +337,18 @@ impl Document {
                 independent.len()
             ));
         }
+        if let Model::Tiling { layout, .. } = &self.model
+            && let Some(fault) = layout.fault(independent.len())
+        {
+            return bad(fault);
+        }
         let terms = self.terms();
+        let weights = if matches!(self.model, Model::Tiling { .. }) { 1 } else { terms.len() };
         for (i, channel) in independent.iter().enumerate() {
-            if channel.weights.len() != terms.len() || channel.weights.iter().any(|w| *w < 0.0) {
+            if channel.weights.len() != weights || channel.weights.iter().any(|w| *w < 0.0) {
                 return bad(format!(
-                    "independent channel {i} has {} weights for {} bands, or one below 0",
+                    "independent channel {i} has {} weights instead of {weights}, or one below 0",
                     channel.weights.len(),
-                    terms.len()
                 ));
             }
             let rises = |h: &Vec<f64>| h.len() == KNOTS.len() && h.windows(2).all(|w| w[0] <= w[1]);

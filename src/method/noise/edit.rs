@@ -2,10 +2,13 @@
 
 use std::ops::Range;
 
+use crate::base::ctx::Ctx;
+use crate::base::error::Result;
 use crate::base::params::Value as _;
 use crate::image::material::MapKind;
 use crate::method::noise::document::{Band, Document, MOST_LEVEL, Model, Term};
 use crate::method::noise::shape::Shape;
+use crate::method::noise::tiling;
 use crate::signal::wavelet_noise::spectrum::at_pixels;
 
 /// Luma of display-referred red, green and blue (ITU-R BT.709).
@@ -104,6 +107,7 @@ impl Document {
                 *bands = kept.collect();
                 self.terms()
             }
+            Model::Tiling { .. } => return false,
         };
         let (before, after) = (variances(&before), variances(&after));
         self.reweigh([&before, &after], |weights| {
@@ -116,9 +120,29 @@ impl Document {
         true
     }
 
+    /// Steps of progress that [`Document::reseed`] takes.
+    pub fn reseed_steps(&self) -> u64 {
+        if matches!(self.model, Model::Tiling { .. }) { tiling::steps() } else { 0 }
+    }
+
+    /// Another texture with the same statistics.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`](crate::Error::Cancelled).
+    pub fn reseed(&mut self, ctx: &Ctx, seed: u32) -> Result<()> {
+        self.seed = seed;
+        match &mut self.model {
+            Model::Tiling { layout, channels } => {
+                let deviations: Vec<f64> = channels.iter().map(|c| c.weights[0]).collect();
+                layout.choose(ctx, &deviations, seed)
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Takes the histograms away: channels are normally distributed, with the same variance.
     pub fn make_normal(&mut self) {
-        let variances = variances(&self.terms());
+        let variances = self.variances();
         for channel in self.channels_mut() {
             let Some(histogram) = channel.histogram.take() else { continue };
             let is = deviation(&channel.weights, &variances);
@@ -148,7 +172,7 @@ fn octave(term: &Term) -> usize {
 }
 
 /// Variance of every band with unit weight at the photo's pixels.
-pub(super) fn variances(terms: &[Term]) -> Vec<f64> {
+fn variances(terms: &[Term]) -> Vec<f64> {
     terms.iter().map(|term| at_pixels(term.detail, term.levels)).collect()
 }
 

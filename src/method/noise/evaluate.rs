@@ -3,8 +3,12 @@
 use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
 
+use crate::base::ctx::Ctx;
+use crate::base::error::Result;
 use crate::method::noise::document::{Document, Model, Term};
 use crate::method::noise::shape::Shape;
+use crate::method::noise::tiling::table::Places;
+use crate::method::noise::tiling::{Layout, Tiling};
 use crate::signal::wavelet_noise::spectrum::{ALIKE, at_pixels};
 use crate::signal::wavelet_noise::{Detail, Solid, Torus};
 
@@ -24,11 +28,13 @@ impl Filter {
 }
 
 /// A document made ready to give values at points.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Evaluator {
     document: Document,
     pub(super) terms: Vec<Term>,
     pub(super) tori: Vec<Arc<Torus>>,
+    /// Instead of terms, of a texture that is tiled.
+    pub(super) tiling: Option<Tiling>,
     /// Of each term, for points in space.
     solids: OnceLock<Vec<Arc<Solid>>>,
     /// Variance of each term's noise at the photo's pixels.
@@ -59,6 +65,8 @@ pub(crate) struct Filtered {
     pub(crate) per_deviation: f32,
     /// Standard deviation of what the filter took away, in those of all.
     lost: f32,
+    /// Level of a tiled texture's input.
+    level: f32,
 }
 
 impl Evaluator {
@@ -76,7 +84,10 @@ impl Evaluator {
             let levels = t.levels.map(|level| level.min(ALIKE));
             *known.entry((t.detail, levels)).or_insert_with(|| at_pixels(t.detail, levels))
         };
-        let at_pixels: Vec<f64> = terms.iter().map(variance).collect();
+        let at_pixels: Vec<f64> = match document.model {
+            Model::Tiling { .. } => document.variances(),
+            _ => terms.iter().map(variance).collect(),
+        };
         let channels = document.channels().iter().enumerate().map(|(c, channel)| {
             let offset = |(t, term): (usize, &Term)| {
                 let [x, y] = term.levels;
@@ -92,6 +103,11 @@ impl Evaluator {
                 }),
             }
         });
+        let channels: Vec<ChannelEvaluator> = channels.collect();
+        let tiling = match &document.model {
+            Model::Tiling { layout, .. } => Tiling::new(layout, channels.len()),
+            _ => None,
+        };
         let turn = match &document.model {
             Model::Oriented { angle, .. } if *angle != 0.0 => {
                 let radians = angle.to_radians();
@@ -100,7 +116,8 @@ impl Evaluator {
             _ => None,
         };
         Self {
-            channels: channels.collect(),
+            channels,
+            tiling,
             mean: document.mean.iter().map(|&v| v as f32).collect(),
             matrix: document.matrix.iter().map(|r| r.iter().map(|&v| v as f32).collect()).collect(),
             terms,
@@ -110,6 +127,29 @@ impl Evaluator {
             turn,
             document,
         }
+    }
+
+    /// Steps of progress that [`Evaluator::periodic`] takes.
+    pub fn periodic_steps(&self, period: [f64; 2]) -> u64 {
+        self.tiling.as_ref().map_or(0, |tiling| tiling.steps(period))
+    }
+
+    /// For a tiled texture one that goes round after `period` pixels of the photo along x and y; noise goes
+    /// round by [`raster`](super::raster::render) alone.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`](crate::Error::Cancelled).
+    pub fn periodic(&self, ctx: &Ctx, period: [f64; 2]) -> Result<Self> {
+        let around =
+            |tiling: &Tiling| tiling.periodic(ctx, period, &self.deviations(), self.document.seed);
+        Ok(Self { tiling: self.tiling.as_ref().map(around).transpose()?, ..self.clone() })
+    }
+
+    /// Layout, places and deviations by level of a tiled texture.
+    pub(crate) fn tiled(&self) -> Option<(&Layout, Places, &[Vec<f64>])> {
+        let Model::Tiling { layout, .. } = &self.document.model else { return None };
+        let tiling = self.tiling.as_ref()?;
+        Some((layout, layout.places()?, tiling.deviations()))
     }
 
     /// What it was made of.
@@ -129,6 +169,9 @@ impl Evaluator {
 
     /// The weights of every independent channel under `filter`.
     pub(crate) fn filtered(&self, filter: Filter) -> Vec<Filtered> {
+        if let Some(tiling) = &self.tiling {
+            return self.tiles_filtered(tiling, filter);
+        }
         let kept: Vec<f64> = self.terms.iter().map(|t| kept(t, filter.footprint)).collect();
         let of = |channel: &ChannelEvaluator| {
             let total: f64 = channel.variances.iter().sum();
@@ -142,9 +185,27 @@ impl Evaluator {
                 weights: channel.weights.iter().zip(&kept).map(weight).collect(),
                 per_deviation: if total > 0.0 { total.sqrt().recip() as f32 } else { 0.0 },
                 lost: if total > 0.0 { (lost / total).sqrt() as f32 } else { 0.0 },
+                level: 0.0,
             }
         };
         self.channels.iter().map(of).collect()
+    }
+
+    fn tiles_filtered(&self, tiling: &Tiling, filter: Filter) -> Vec<Filtered> {
+        let kept = tiling.kept(filter.footprint);
+        let of = |(channel, deviation): (&ChannelEvaluator, &f64)| {
+            let left = kept.fade * deviation;
+            let keep = filter.keep_contrast && left > 0.0;
+            let gain = if keep { kept.fade / left } else { kept.fade };
+            let weight = channel.weights[0];
+            Filtered {
+                weights: vec![(f64::from(weight) * gain) as f32],
+                per_deviation: if weight > 0.0 { weight.recip() } else { 0.0 },
+                lost: if keep { 0.0 } else { (1.0 - left * left).max(0.0).sqrt() as f32 },
+                level: kept.level,
+            }
+        };
+        self.channels.iter().zip(&kept.deviations).map(of).collect()
     }
 
     /// Values at points (x, y): every channel, with full scale 1, not clipped.
@@ -154,11 +215,27 @@ impl Evaluator {
         let filtered = self.filtered(filter);
         let mut noise = vec![0.0; self.channels.len()];
         for (point, out) in points.iter().zip(out.chunks_exact_mut(self.channels())) {
-            for ((value, channel), f) in noise.iter_mut().zip(&self.channels).zip(&filtered) {
-                *value = self.plane_noise(channel, f, *point);
+            if let Some(tiling) = &self.tiling {
+                self.tiles(tiling, &filtered, *point, &mut noise);
+            } else {
+                for ((value, channel), f) in noise.iter_mut().zip(&self.channels).zip(&filtered) {
+                    *value = self.plane_noise(channel, f, *point);
+                }
             }
             self.colour(&filtered, &noise, out);
         }
+    }
+
+    /// The independent channels of a tiled texture at a point.
+    #[inline]
+    fn tiles(&self, tiling: &Tiling, filtered: &[Filtered], point: [f64; 2], noise: &mut [f32]) {
+        tiling.at(point, filtered[0].level, noise);
+        noise.iter_mut().zip(filtered).for_each(|(value, f)| *value *= f.weights[0]);
+    }
+
+    /// Standard deviations of the independent channels.
+    fn deviations(&self) -> Vec<f64> {
+        self.channels.iter().map(|channel| channel.variances.iter().sum::<f64>().sqrt()).collect()
     }
 
     fn plane_noise(&self, channel: &ChannelEvaluator, filtered: &Filtered, point: [f64; 2]) -> f32 {

@@ -76,6 +76,7 @@ pub struct Analysis {
 /// The spectrum that a channel's noise shall have.
 #[derive(Debug)]
 pub(super) struct Spectrum {
+    variance: f64,
     /// Power at every frequency of the transform.
     pub(super) power: Vec<f64>,
     /// The histogram's values at the knots.
@@ -90,6 +91,16 @@ impl Analysis {
         let row = |i: usize| self.axes.iter().map(|axis| axis[i]).collect();
         let matrix = (0..self.mean.len()).map(row).collect();
         Fit { mean: self.mean.clone(), matrix, channels }
+    }
+
+    /// Standard deviation and histogram of every independent channel.
+    pub(super) fn channels(&self) -> impl Iterator<Item = (f64, Option<&Vec<f64>>)> {
+        self.spectra.iter().map(|s| (s.variance.sqrt(), s.histogram.as_ref()))
+    }
+
+    /// The independent channels of the exemplar that was analysed.
+    pub(super) fn planes(&self, exemplar: &Exemplar) -> Vec<Vec<f32>> {
+        self.axes.iter().map(|axis| along(exemplar, &self.mean, axis)).collect()
     }
 }
 
@@ -271,7 +282,7 @@ fn spectrum(
         .filter(|_| with_structure)
         .map(|normal| Structure::of(&normal, exemplar.shape, &power));
     let histogram = options.histogram.then(|| ranks.knots.to_vec());
-    Spectrum { power, histogram, structure }
+    Spectrum { variance, power, histogram, structure }
 }
 
 /// The spectrum that noise must have for its values to have the spectrum `power` once `shape` has brought

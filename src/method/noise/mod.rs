@@ -14,6 +14,7 @@ mod ranks;
 pub mod raster;
 pub mod score;
 mod shape;
+pub mod tiling;
 
 pub use document::{Band, BandShape, Channel, Document, MapSpec, Model, Score};
 pub use evaluate::{Evaluator, Filter};

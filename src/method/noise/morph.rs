@@ -2,7 +2,7 @@
 
 use crate::base::error::{Error, Result};
 use crate::method::noise::document::{Channel, Document, MapSpec, Model, Score};
-use crate::method::noise::edit::{deviation, variances};
+use crate::method::noise::edit::deviation;
 use crate::method::noise::shape::KNOTS;
 
 /// The texture between `a` (t = 0) and `b` (t = 1): all numbers go straight, but for colours, which turn.
@@ -118,6 +118,10 @@ fn between(a: &Model, b: &Model, t: f64) -> Result<(Model, [Vec<usize>; 2])> {
         (Model::Oriented { .. }, Model::Wavelet { .. }) => {
             bad("noise with directions", "isotropic noise")
         }
+        (Model::Tiling { .. }, _) | (_, Model::Tiling { .. }) => {
+            let expected = "noise, as the first must be: only that has numbers to go between";
+            Err(Error::parameter("other", expected, "tiling and blending"))
+        }
     }
 }
 
@@ -125,6 +129,7 @@ fn with_channels(model: Model, channels: Vec<Channel>) -> Model {
     match model {
         Model::Wavelet { bands, .. } => Model::Wavelet { bands, channels },
         Model::Oriented { angle, bands, .. } => Model::Oriented { angle, bands, channels },
+        Model::Tiling { layout, .. } => Model::Tiling { layout, channels },
     }
 }
 
@@ -176,7 +181,7 @@ fn shaped(document: &Document) -> Document {
     if document.channels().iter().all(|c| c.histogram.is_some()) {
         return document;
     }
-    let variances = variances(&document.terms());
+    let variances = document.variances();
     for channel in document.channels_mut().iter_mut().filter(|c| c.histogram.is_none()) {
         let deviation = deviation(&channel.weights, &variances);
         channel.histogram = Some(KNOTS.map(|u| u * deviation).to_vec());

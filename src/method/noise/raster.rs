@@ -36,6 +36,8 @@ struct Grid {
 /// Renders these rows of `view`, a step of progress to each: row by row, for every pixel all channels, with
 /// full scale 1, not clipped. The same bits whichever rows are rendered together.
 ///
+/// A tiled texture goes round if its evaluator does: see [`Evaluator::periodic`].
+///
 /// # Errors
 /// [`Error::Cancelled`](crate::Error::Cancelled).
 pub fn render(
@@ -49,7 +51,7 @@ pub fn render(
     let channels = evaluator.channels();
     let mut out = vec![0.0; rows.len() * cols * channels];
     let at = |i: usize, axis: usize| view.origin[axis] + (i as f64 + 0.5) * view.scale;
-    if evaluator.turn.is_some() {
+    if evaluator.turn.is_some() || evaluator.tiling.is_some() {
         // Not along the axes: point by point.
         let lines = out.par_chunks_mut(cols * channels).enumerate();
         return lines

@@ -51,6 +51,11 @@ impl Structure {
         let patchiness = (self.patchiness - 0.4 * self.anisotropy).max(0.0);
         libm::exp(-self.kurtosis - 2.0 * patchiness - 0.5 * self.anisotropy)
     }
+
+    /// The same of tiling and blending, which keeps all but what lies across borders.
+    pub fn tiling_fit(&self) -> f64 {
+        libm::exp(-0.3 * self.kurtosis - 0.6 * self.patchiness)
+    }
 }
 
 /// Kurtosis and patchiness.
@@ -93,7 +98,7 @@ fn of_octaves(plane: &[f32], (rows, cols): (usize, usize)) -> (f64, f64) {
 }
 
 /// A plane blurred by the cubic B-spline's taps, `step` samples apart, along both axes.
-fn blurred(plane: &[f32], (height, width): (usize, usize), step: usize) -> Vec<f32> {
+pub(super) fn blurred(plane: &[f32], (height, width): (usize, usize), step: usize) -> Vec<f32> {
     const TAPS: [f32; 5] = [0.0625, 0.25, 0.375, 0.25, 0.0625];
     let mirrored = |i: usize, k: usize, n: usize| {
         let at = (i + k * step) as i64 - 2 * step as i64;

@@ -1,8 +1,9 @@
 //! [`NoiseEdit`]: what can be changed in a fitted texture.
 
+use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
 use crate::base::params::params;
-use crate::method::noise::{self, Document};
+use crate::method::noise::{self, Document, Model};
 use crate::verb::noise::{Histogram, NoiseTexture};
 
 params! {
@@ -38,6 +39,9 @@ pub struct NoiseEdit {
 /// Largest factor of an octave's weight.
 const MOST_GAIN: f64 = 100.0;
 
+/// What a tiled texture can have of what changes bands.
+const WITHOUT_BANDS: &str = "left out for this texture, whose tiles have no bands";
+
 /// Farthest that a mean may be from 0.
 const MOST_MEAN: f64 = 1e4;
 
@@ -59,8 +63,9 @@ impl NoiseTexture {
     /// # Errors
     /// [`Error::Parameter`] for a number out of range, more gains than the texture has octaves, a mean
     /// for a map that it has not or with another number of channels, and a feature size that is no power of
-    /// two, or leaves no band that a texture can have, and numbers that leave a document's range.
-    pub fn edit(&self, edit: &NoiseEdit) -> Result<Self> {
+    /// two, or leaves no band that a texture can have, and numbers that leave a document's range; for gains
+    /// and feature sizes of a tiled texture, which has no bands. [`Error::Cancelled`].
+    pub fn edit(&self, ctx: &Ctx, edit: &NoiseEdit) -> Result<Self> {
         let params = &edit.params;
         params.validate()?;
         let mut document = self.document().clone();
@@ -73,7 +78,10 @@ impl NoiseTexture {
         document.saturate(f64::from(params.saturation));
         document.brighten(f64::from(params.brightness));
         edit.means.iter().try_for_each(|(map, mean)| set_mean(&mut document, map, mean))?;
-        document.seed = edit.seed.unwrap_or(document.seed);
+        if let Some(seed) = edit.seed.filter(|seed| *seed != document.seed) {
+            ctx.begin(document.reseed_steps());
+            ctx.install(|| document.reseed(ctx, seed))?;
+        }
         let document = document.rounded();
         // It must be possible to read what is written.
         document.validate().map_err(|_| {
@@ -85,6 +93,9 @@ impl NoiseTexture {
 }
 
 fn gain(document: &mut Document, gains: &[f64]) -> Result<()> {
+    if let (Model::Tiling { .. }, Some(first)) = (&document.model, gains.first()) {
+        return Err(Error::parameter("gains", WITHOUT_BANDS, first));
+    }
     if let Some(bad) = gains.iter().find(|gain| !(0.0..=MOST_GAIN).contains(*gain)) {
         return Err(Error::parameter("gains", format!("factors of 0 to {MOST_GAIN}"), bad));
     }
@@ -98,6 +109,9 @@ fn gain(document: &mut Document, gains: &[f64]) -> Result<()> {
 }
 
 fn resize(document: &mut Document, factor: f32) -> Result<()> {
+    if matches!(document.model, Model::Tiling { .. }) && factor != 1.0 {
+        return Err(Error::parameter("feature_size", WITHOUT_BANDS, factor));
+    }
     let octaves = libm::log2f(factor);
     if octaves != octaves.round() {
         let expected = "a power of two, as bands are octaves of the photo's pixels (choose another \
@@ -134,8 +148,7 @@ fn set_mean(document: &mut Document, map: &str, mean: &[f64]) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::ctx::Ctx;
-    use crate::method::noise::{Band, BandShape, Channel, Filter, KNOTS, MapSpec, Model, Score};
+    use crate::method::noise::{Band, BandShape, Channel, Filter, KNOTS, MapSpec, Score};
     use crate::signal::wavelet_noise::Part;
     use crate::signal::wavelet_noise::spectrum::at_pixels;
 
@@ -172,7 +185,11 @@ mod tests {
     fn edited(texture: &NoiseTexture, change: impl FnOnce(&mut NoiseEdit)) -> Result<NoiseTexture> {
         let mut edit = NoiseEdit::default();
         change(&mut edit);
-        texture.edit(&edit)
+        texture.edit(&ctx(), &edit)
+    }
+
+    fn ctx() -> Ctx {
+        Ctx::new(0, 1).expect("context")
     }
 
     /// Values far from each other.
@@ -180,8 +197,7 @@ mod tests {
         let points: Vec<[f64; 2]> = (0..4000)
             .map(|i| [f64::from(i % 63) * 71.25 + 0.5, f64::from(i / 63) * 93.75 + 0.5])
             .collect();
-        let ctx = Ctx::new(0, 1).expect("context");
-        let values = texture.at(&ctx, &points, Filter::NONE).expect("values");
+        let values = texture.at(&ctx(), &points, Filter::NONE).expect("values");
         values.chunks(4).map(|v| std::array::from_fn(|i| f64::from(v[i]))).collect()
     }
 
@@ -195,7 +211,7 @@ mod tests {
     #[test]
     fn the_default_changes_nothing() {
         for texture in [texture(None), texture(Some((0.05, 0.004)))] {
-            let same = texture.edit(&NoiseEdit::default()).expect("no change");
+            let same = texture.edit(&ctx(), &NoiseEdit::default()).expect("no change");
             assert_eq!(same.to_json(), texture.to_json());
             let gains = edited(&texture, |edit| edit.gains = vec![1.0; 4]).expect("no change");
             assert_eq!(gains.to_json(), texture.to_json());

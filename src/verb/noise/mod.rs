@@ -19,10 +19,11 @@ use crate::method::noise::document::MOST_CHANNELS;
 use crate::method::noise::fit::{self, Exemplar};
 use crate::method::noise::oriented;
 use crate::method::noise::score::Structure;
+use crate::method::noise::tiling;
 use crate::method::noise::{BandShape, Document, MapSpec, Model, Score};
 
 pub use edit::{NoiseEdit, NoiseEditParams};
-pub use params::{Bands, Directions, Histogram, NoiseParams, Weights};
+pub use params::{Bands, Histogram, Kind, NoiseParams, Weights};
 pub use texture::{NoiseTexture, RenderParams, RenderedMap, SampleType};
 
 /// Shortest side of a photo that can be fitted: a few bands.
@@ -53,7 +54,7 @@ pub struct NoiseReport {
     /// How well noise of the kind that was fitted fits, in 0..=1; from 0.5 on it can be taken for the
     /// photo at a glance.
     pub fit: f64,
-    /// Which kind fits best: `wavelet`, `oriented` or `none`.
+    /// Which kind fits best: `wavelet`, `oriented`, `tiling` or `none`; noise first, as it is smaller.
     pub recommended: String,
     /// Excess kurtosis of the photo's octaves: edges and marks, which noise lacks.
     pub kurtosis: f64,
@@ -110,7 +111,8 @@ fn run(
     let usable = usable(maps, mask)?;
     let planes: Vec<Vec<f32>> = maps.iter().flat_map(|map| planes(map.picture)).collect();
     let prepared = begun.elapsed().as_secs_f64();
-    ctx.begin(2 + planes.len() as u64);
+    let tiles = if params.model == Kind::Tiling { tiling::steps() } else { 0 };
+    ctx.begin(2 + planes.len() as u64 + tiles);
     let exemplar = Exemplar {
         planes: &planes,
         shape: (height, width),
@@ -127,22 +129,30 @@ fn run(
     };
     let analysis = fit::analyse(ctx, &exemplar, options)?;
     let structure = analysis.structure;
-    let directed = match params.directions {
-        Directions::Auto => structure.anisotropy > DIRECTED,
-        Directions::Isotropic => false,
-        Directions::Oriented => true,
+    let kind = match params.model {
+        Kind::Auto if structure.anisotropy > DIRECTED => Kind::Oriented,
+        Kind::Auto => Kind::Wavelet,
+        kind => kind,
     };
-    let (fitted, model) = if directed {
-        let oriented::Oriented { angle, bands, fit } = oriented::fit(&analysis, exemplar.shape);
-        let channels = fit.channels.clone();
-        (fit, Model::Oriented { angle, bands, channels })
-    } else {
-        let fit = fit::fit(&analysis, exemplar.shape, options);
-        let channels = fit.channels.clone();
-        (fit, Model::Wavelet { bands: shape, channels })
+    let (fitted, model) = match kind {
+        Kind::Tiling => {
+            let (fit, layout) = tiling::fit::fit(ctx, &analysis, &exemplar, tiled(params))?;
+            let channels = fit.channels.clone();
+            (fit, Model::Tiling { layout, channels })
+        }
+        Kind::Oriented => {
+            let oriented::Oriented { angle, bands, fit } = oriented::fit(&analysis, exemplar.shape);
+            let channels = fit.channels.clone();
+            (fit, Model::Oriented { angle, bands, channels })
+        }
+        Kind::Wavelet | Kind::Auto => {
+            let fit = fit::fit(&analysis, exemplar.shape, options);
+            let channels = fit.channels.clone();
+            (fit, Model::Wavelet { bands: shape, channels })
+        }
     };
-    let score = score(&structure, directed);
-    notes.extend(advice(&structure, &score, directed));
+    let score = score(&structure, kind);
+    notes.extend(advice(&structure, &score, kind));
     ctx.step(1)?;
     if maps.iter().any(|map| map.picture.alpha_channel().is_some()) {
         notes.push("alpha says where the photo counts; the texture has none".into());
@@ -180,37 +190,54 @@ const DIRECTED: f64 = 0.2;
 /// From which fit on noise is recommended.
 const GOOD: f64 = 0.5;
 
-fn score(structure: &Structure, directed: bool) -> Score {
-    let (isotropic, oriented) = (structure.isotropic_fit(), structure.oriented_fit());
-    let recommended = match (isotropic, oriented) {
-        (fit, _) if fit >= GOOD => "wavelet",
-        (_, fit) if fit >= GOOD => "oriented",
-        _ => "none",
+fn score(structure: &Structure, kind: Kind) -> Score {
+    let fits = [
+        ("wavelet", structure.isotropic_fit()),
+        ("oriented", structure.oriented_fit()),
+        ("tiling", structure.tiling_fit()),
+    ];
+    let good = fits.into_iter().find(|(_, fit)| *fit >= GOOD);
+    let fit = match kind {
+        Kind::Wavelet | Kind::Auto => fits[0].1,
+        Kind::Oriented => fits[1].1,
+        Kind::Tiling => fits[2].1,
     };
-    Score { fit: if directed { oriented } else { isotropic }, recommended: recommended.into() }
+    Score { fit, recommended: good.map_or("none", |(name, _)| name).into() }
 }
 
 /// What the user should know about the fit.
-fn advice(structure: &Structure, score: &Score, directed: bool) -> Option<String> {
+fn advice(structure: &Structure, score: &Score, kind: Kind) -> Option<String> {
     let fit = score.fit;
-    match score.recommended.as_str() {
-        "none" => {
-            let reason = if structure.kurtosis > 2.0 * structure.patchiness {
-                "it has edges or marks"
-            } else {
-                "its detail varies from place to place"
-            };
-            Some(format!(
-                "noise fits this photo badly ({fit:.2} of 1): {reason}, which noise does not have; \
-                 `tile` keeps them"
-            ))
-        }
-        "oriented" if !directed => Some(format!(
+    let reason = if structure.kurtosis > 2.0 * structure.patchiness {
+        "it has edges or marks"
+    } else {
+        "its detail varies from place to place"
+    };
+    match (score.recommended.as_str(), kind) {
+        ("none", Kind::Tiling) => Some(format!(
+            "tiling fits this photo badly ({fit:.2} of 1): its shapes are too large for it; `tile` or \
+             `regular` keep them"
+        )),
+        ("none", _) => Some(format!(
+            "noise fits this photo badly ({fit:.2} of 1): {reason}, which noise does not have; \
+             `tile` keeps them"
+        )),
+        ("tiling", Kind::Wavelet | Kind::Oriented | Kind::Auto) => Some(format!(
+            "noise fits this photo badly ({fit:.2} of 1): {reason}, which noise does not have; \
+             the model `tiling` keeps them"
+        )),
+        ("oriented", Kind::Wavelet) => Some(format!(
             "the photo has a direction, and this noise has none ({fit:.2} of 1); oriented noise fits \
              better"
         )),
         _ => None,
     }
+}
+
+/// How tiles are made.
+fn tiled(params: &NoiseParams) -> tiling::fit::Options {
+    let [cell, sharpness, longest] = [params.cell, params.sharpness, params.keep].map(|n| n as u32);
+    tiling::fit::Options { cell, sharpness, longest }
 }
 
 /// The size that all maps have.

@@ -14,7 +14,7 @@ const IN_ROW: usize = 4;
 
 impl NoiseTexture {
     /// A picture of 8 bits to look at, of the first map: in the first row the photo (its middle, if one is
-    /// given), the texture and the texture four times as large, then each octave alone, the finest first.
+    /// given), the texture and the texture four times as large, then each octave of noise alone, the finest first.
     ///
     /// # Errors
     /// [`Error::Memory`](crate::Error::Memory), [`Error::Cancelled`](crate::Error::Cancelled); of a photo
@@ -36,7 +36,7 @@ impl NoiseTexture {
         let octaves = self.document().octaves();
         let alone = |octave: usize| -> Result<Picture> {
             let gains = (0..octaves).map(|i| f64::from(u8::from(i == octave))).collect();
-            of(&self.edit(&NoiseEdit { gains, ..Default::default() })?, 1.0)
+            of(&self.edit(ctx, &NoiseEdit { gains, ..Default::default() })?, 1.0)
         };
         let octaves = (0..octaves).map(alone).collect::<Result<Vec<_>>>()?;
         rows.extend(octaves.chunks(IN_ROW).map(<[Picture]>::to_vec));

@@ -117,7 +117,7 @@ impl NoiseTexture {
     ///
     /// # Errors
     /// Those of [`NoiseTexture::at`]; [`Error::Parameter`] also if there is not one normal to a point, if
-    /// one is no direction, and for oriented noise, which has no third axis.
+    /// one is no direction, and for a texture that is not isotropic noise: it has no third axis.
     pub fn solid(
         &self,
         ctx: &Ctx,
@@ -140,7 +140,7 @@ impl NoiseTexture {
     ///
     /// # Errors
     /// [`Error::Parameter`] for a side of 0 or more than 65536 voxels, a scale or an origin out of range, and
-    /// for oriented noise; [`Error::Memory`]; [`Error::Cancelled`].
+    /// for a texture that is not isotropic noise; [`Error::Memory`]; [`Error::Cancelled`].
     pub fn volume(
         &self,
         ctx: &Ctx,
@@ -182,7 +182,7 @@ impl NoiseTexture {
         if matches!(self.document().model, Model::Wavelet { .. }) {
             return Ok(());
         }
-        let expected = "of two axes (x, y) for this texture, which has directions";
+        let expected = "of two axes (x, y) for this texture, which lies on the plane";
         Err(Error::parameter(name, expected, "three"))
     }
 
@@ -228,7 +228,7 @@ impl NoiseTexture {
         ctx: &Ctx,
         params: &RenderParams,
         pixels: usize,
-    ) -> Result<impl Iterator<Item = Result<Vec<RenderedMap>>> + use<'_>> {
+    ) -> Result<impl Iterator<Item = Result<Vec<RenderedMap>>> + use<>> {
         let (width, height) = params.size;
         if [width, height].iter().any(|n| !(1..=Picture::MAX_SIDE).contains(n)) {
             return Err(Error::parameter(
@@ -246,10 +246,19 @@ impl NoiseTexture {
         let rows = (pixels / width).clamp(1, height);
         let bytes = (width * rows).checked_mul(self.channels() * 8);
         ensure_available("the picture", bytes.map(|n| n as u64))?;
-        ctx.begin(height as u64);
+        let period = params.tileable.then(|| [width, height].map(|n| n as f64 * params.scale));
+        let steps = period.map_or(0, |period| self.evaluator.periodic_steps(period));
+        ctx.begin(height as u64 + steps);
+        let texture = match period.filter(|_| steps > 0) {
+            None => self.clone(),
+            Some(period) => {
+                let evaluator = ctx.install(|| self.evaluator.periodic(ctx, period))?;
+                Self { evaluator: Arc::new(evaluator) }
+            }
+        };
         let (ctx, params) = (ctx.clone(), *params);
         let strip =
-            move |first: usize| self.strip(&ctx, &params, first..(first + rows).min(height));
+            move |first: usize| texture.strip(&ctx, &params, first..(first + rows).min(height));
         Ok((0..height).step_by(rows).map(strip))
     }
 

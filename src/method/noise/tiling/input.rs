@@ -1,0 +1,251 @@
+//! [`Input`]: the part of the photo that tiling and blending is made of.
+
+use std::sync::Arc;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use serde::{Deserialize, Serialize};
+
+use crate::base::error::Result;
+use crate::image::io::{Format, WriteOptions, encode, read_bytes};
+use crate::image::material::MapKind;
+use crate::image::picture::{Encoding, Picture, Samples};
+
+/// Channels that are stored in one picture.
+pub const TOGETHER: usize = 3;
+
+/// Samples are 16 bits: this many to a standard deviation, with 0 in the middle.
+pub const PER_DEVIATION: f64 = 8192.0;
+
+/// A standard normal number of 0.
+const ZERO: u16 = 1 << 15;
+
+/// Longest side.
+pub const LONGEST: u32 = 8192;
+
+/// Pictures whose samples are the independent channels as standard normal numbers.
+///
+/// In JSON each picture of up to three channels is a PNG file in base 64.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Stored", into = "Stored")]
+pub struct Input {
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// Row by row, pixels interleaved: of one channel if there is no other, else of [`TOGETHER`], of which
+    /// some in the last picture may be unused.
+    pub pictures: Arc<Vec<Vec<u16>>>,
+}
+
+/// As it is written.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Stored {
+    size: [u32; 2],
+    png: Vec<String>,
+}
+
+impl Input {
+    /// Of planes of standard normal numbers.
+    pub(super) fn new(size: [u32; 2], planes: &[Vec<f32>]) -> Self {
+        let stored = |v: f32| {
+            let steps = (f64::from(v) * PER_DEVIATION).round() + f64::from(ZERO);
+            steps.clamp(0.0, f64::from(u16::MAX)) as u16
+        };
+        let pixels = (size[0] * size[1]) as usize;
+        let picture = |planes: &[Vec<f32>], together: usize| {
+            let sample =
+                |i: usize| planes.get(i % together).map_or(ZERO, |p| stored(p[i / together]));
+            (0..pixels * together).map(sample).collect()
+        };
+        let pictures = match planes {
+            [_] => vec![picture(planes, 1)],
+            _ => planes.chunks(TOGETHER).map(|planes| picture(planes, TOGETHER)).collect(),
+        };
+        Self { size, pictures: Arc::new(pictures) }
+    }
+
+    /// Channels in each picture.
+    pub fn together(&self) -> usize {
+        let pixels = (self.size[0] as usize * self.size[1] as usize).max(1);
+        self.pictures.first().map_or(0, |picture| picture.len() / pixels)
+    }
+
+    /// Whether it is of so many channels.
+    pub fn is_of(&self, channels: usize) -> bool {
+        match channels {
+            1 => self.pictures.len() == 1 && self.together() == 1,
+            n => self.pictures.len() == n.div_ceil(TOGETHER) && self.together() == TOGETHER,
+        }
+    }
+
+    /// The pictures as PNG files of 16 bits, whose numbers are data, not colours.
+    ///
+    /// # Errors
+    /// None that a picture in memory can have.
+    pub fn files(&self) -> Result<Vec<Vec<u8>>> {
+        let [width, height] = self.size.map(|n| n as usize);
+        let file = |samples: &Vec<u16>| {
+            let samples = Samples::U16(samples.clone());
+            let picture = Picture::new(height, width, self.together(), samples, Encoding::Data)?;
+            encode(&picture, Format::Png, &WriteOptions::new(MapKind::Data))
+        };
+        self.pictures.iter().map(file).collect()
+    }
+
+    /// All channels as standard normal numbers, pixels interleaved.
+    pub(super) fn interleaved(&self, channels: usize) -> Vec<f32> {
+        let [width, height] = self.size.map(|n| n as usize);
+        let together = self.together();
+        let sample = |i: usize| {
+            let (pixel, c) = (i / channels, i % channels);
+            let stored = self.pictures[c / together][pixel * together + c % together];
+            ((f64::from(stored) - f64::from(ZERO)) / PER_DEVIATION) as f32
+        };
+        (0..width * height * channels).map(sample).collect()
+    }
+}
+
+impl From<Input> for Stored {
+    fn from(input: Input) -> Self {
+        // Pictures of these sizes and samples can always be written.
+        let files = input.files().unwrap_or_default();
+        Self { size: input.size, png: files.iter().map(|f| STANDARD.encode(f)).collect() }
+    }
+}
+
+impl TryFrom<Stored> for Input {
+    type Error = String;
+
+    fn try_from(stored: Stored) -> std::result::Result<Self, String> {
+        let [width, height] = stored.size;
+        if stored.size.iter().any(|&n| n == 0 || n > LONGEST) {
+            return Err(format!("its input is {width}x{height}, not 1 to {LONGEST} pixels a side"));
+        }
+        let picture = |(i, text): (usize, &String)| {
+            let bad = |reason: String| format!("picture {i} of its input is damaged ({reason})");
+            let bytes = STANDARD.decode(text).map_err(|e| bad(e.to_string()))?;
+            let picture =
+                read_bytes(&bytes, "the picture", MapKind::Data).map_err(|e| bad(e.to_string()))?;
+            if (picture.width(), picture.height()) != (width as usize, height as usize) {
+                let (w, h) = (picture.width(), picture.height());
+                return Err(format!("picture {i} of its input is {w}x{h}, not {width}x{height}"));
+            }
+            match picture.samples() {
+                Samples::U16(samples) if [1, TOGETHER].contains(&picture.channels()) => {
+                    Ok(samples.clone())
+                }
+                _ => Err(bad("not 16 bits of one or three channels".into())),
+            }
+        };
+        let pictures: Vec<_> =
+            stored.png.iter().enumerate().map(picture).collect::<std::result::Result<_, _>>()?;
+        if pictures.windows(2).any(|p| p[0].len() != p[1].len()) {
+            return Err("the pictures of its input have different numbers of channels".into());
+        }
+        Ok(Self { size: stored.size, pictures: Arc::new(pictures) })
+    }
+}
+
+/// The input at full size and at halves of it.
+#[derive(Debug)]
+pub(super) struct Pyramid {
+    /// Width, height and samples, pixels interleaved.
+    levels: Vec<(usize, usize, Vec<f32>)>,
+    channels: usize,
+    /// Standard deviation of every channel in each level, in that of the first.
+    deviations: Vec<Vec<f64>>,
+}
+
+impl Pyramid {
+    /// With `halvings` levels above the input, whose sides those divide.
+    pub(super) fn new(input: &Input, channels: usize, halvings: u32) -> Self {
+        let [width, height] = input.size.map(|n| n as usize);
+        let mut levels = vec![(width, height, input.interleaved(channels))];
+        for _ in 0..halvings {
+            let halved = levels.last().map(|(w, h, fine)| halved((*w, *h), fine, channels));
+            levels.extend(halved);
+        }
+        let squares: Vec<Vec<f64>> = levels.iter().map(|(_, _, s)| squares(s, channels)).collect();
+        let deviation = |of: &Vec<f64>| {
+            let share =
+                |(s, all): (&f64, &f64)| if *all > 0.0 { (s / all).sqrt().min(1.0) } else { 0.0 };
+            of.iter().zip(&squares[0]).map(share).collect()
+        };
+        let deviations = squares.iter().map(deviation).collect();
+        Self { levels, channels, deviations }
+    }
+
+    /// The coarsest level.
+    pub(super) fn coarsest(&self) -> u32 {
+        self.levels.len() as u32 - 1
+    }
+
+    /// Standard deviation of every channel in every level, in that of the first.
+    pub(super) fn deviations(&self) -> &[Vec<f64>] {
+        &self.deviations
+    }
+
+    /// Width, height and samples of the input.
+    pub(super) fn finest(&self) -> (usize, usize, &[f32]) {
+        let (width, height, samples) = &self.levels[0];
+        (*width, *height, samples)
+    }
+
+    /// Adds `weight` times the channels at a position in pixels of the photo: linear between pixels, and
+    /// between levels; the border goes on outside.
+    #[inline]
+    pub(super) fn add(&self, at: [f64; 2], level: f32, weight: f32, out: &mut [f32]) {
+        let below = (level as usize).min(self.levels.len() - 1);
+        let part = level - below as f32;
+        self.add_of(below, at, weight * (1.0 - part), out);
+        if part > 0.0 && below + 1 < self.levels.len() {
+            self.add_of(below + 1, at, weight * part, out);
+        }
+    }
+
+    #[inline]
+    fn add_of(&self, level: usize, at: [f64; 2], weight: f32, out: &mut [f32]) {
+        let (width, height, samples) = &self.levels[level];
+        let per = f64::from(1u32 << level).recip();
+        let place = |v: f64, n: usize| {
+            let v = v * per - 0.5;
+            let first = v.floor();
+            let clamped = |i: f64| i.clamp(0.0, n as f64 - 1.0) as usize;
+            (clamped(first), clamped(first + 1.0), (v - first) as f32)
+        };
+        let ((x0, x1, tx), (y0, y1, ty)) = (place(at[0], *width), place(at[1], *height));
+        let pixel =
+            |x: usize, y: usize| &samples[(y * width + x) * self.channels..][..self.channels];
+        let corners = [pixel(x0, y0), pixel(x1, y0), pixel(x0, y1), pixel(x1, y1)];
+        for (c, out) in out.iter_mut().enumerate() {
+            let [a, b, d, e] = corners.map(|corner| corner[c]);
+            let (top, bottom) = (a + tx * (b - a), d + tx * (e - d));
+            *out += weight * (top + ty * (bottom - top));
+        }
+    }
+}
+
+/// Means of two by two pixels.
+fn halved(
+    (width, height): (usize, usize),
+    fine: &[f32],
+    channels: usize,
+) -> (usize, usize, Vec<f32>) {
+    let (w, h) = (width / 2, height / 2);
+    let sample = |i: usize| {
+        let (pixel, c) = (i / channels, i % channels);
+        let (x, y) = (2 * (pixel % w), 2 * (pixel / w));
+        let at = |x: usize, y: usize| fine[(y * width + x) * channels + c];
+        0.25 * ((at(x, y) + at(x + 1, y)) + (at(x, y + 1) + at(x + 1, y + 1)))
+    };
+    (w, h, (0..w * h * channels).map(sample).collect())
+}
+
+/// Mean square of every channel.
+fn squares(samples: &[f32], channels: usize) -> Vec<f64> {
+    let pixels = (samples.len() / channels) as f64;
+    let sum = |c: usize| {
+        samples.iter().skip(c).step_by(channels).map(|&v| f64::from(v).powi(2)).sum::<f64>()
+    };
+    (0..channels).map(|c| sum(c) / pixels).collect()
+}
