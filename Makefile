@@ -17,7 +17,7 @@ QUALITY ?=
 LATTICES ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-rust test-python test-blender lint format gallery quality lattices extracts regular-gallery readme-pictures bench bench-peers bench-record wheel ci fuzz clean
+.PHONY: help setup demo test test-rust test-python test-blender lint format gallery quality lattices extracts regular-gallery noise-gallery readme-pictures bench bench-peers bench-record wheel ci fuzz clean
 
 help: ## List the targets.
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -96,6 +96,9 @@ extracts: setup ## Extract the tiles of EXEMPLARS that repeat; show them repeate
 
 regular-gallery: setup ## Make larger textures and tiles of EXEMPLARS that repeat; measure them, in regular-gallery/.
 	$(BIN)/python docs/regular.py "$(EXEMPLARS)"
+
+noise-gallery: setup ## Fit procedural textures to EXEMPLARS and write sheets, in noise-gallery/ (NOISES='--class stochastic').
+	$(BIN)/python docs/noises.py "$(EXEMPLARS)" $(NOISES)
 
 readme-pictures: setup ## Make the README's pictures anew, in docs/pictures/.
 	$(BIN)/python docs/readme_pictures.py

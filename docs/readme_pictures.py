@@ -72,6 +72,17 @@ def main() -> None:
         cells.append((f"{label}; cost {cost:.2f}; 3 x 3", small(tile.tiled(), 0.333)))
     save("stain.jpg", [cells])
 
+    cells = [("photo: gravel, 512 x 512", small(photos["gravel"], 0.75))]
+    models: tuple[tuple[texforge.Model, str], ...] = (
+        ("wavelet", "wavelet noise: a kilobyte"),
+        ("tiling", "tiling and blending: 0.7 MB"),
+    )
+    for model, label in models:
+        texture = texforge.fit_noise(photos["gravel"], model=model)
+        print(f"gravel, {model}: fit {texture.score:.2f}")
+        cells.append((f"{label}; fit {texture.score:.2f}", small(texture.render(512), 0.75)))
+    save("noise.jpg", [cells])
+
     palette = texforge.palette(photo, size=SIDE)
     places = zip(palette.stationarities, palette.tiles, strict=True)
     cells = [

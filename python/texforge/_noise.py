@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -16,12 +17,12 @@ from texforge._errors import ParameterError
 from texforge._progress import reporting
 from texforge._types import (
     Bands,
-    Directions,
     Encoding,
     ExportTarget,
     Histogram,
     Image,
     ImageLike,
+    Model,
     PathType,
     Progress,
     SampleType,
@@ -42,10 +43,13 @@ _MOST_SIDE = 65536
 def fit_noise(
     image: ImageLike,
     *,
-    directions: Directions = "auto",
+    model: Model = "auto",
     bands: Bands = "round",
     weights: Weights = "corrected",
     histogram: Histogram = "kept",
+    cell: int = 0,
+    sharpness: int = 4,
+    keep: int = 1024,
     seed: int = 0,
     mask: ImageLike | None = None,
     maps: Mapping[str, ImageLike] | None = None,
@@ -58,17 +62,19 @@ def fit_noise(
     What remains of the photo is about a kilobyte, from which values are computed at any point, on
     the plane or in space: noise with the photo's colours, with its histograms, and in every octave
     as strong as the photo. Noise has no edges and no shapes: for photos of stones, leaves or bricks
-    it is the wrong tool.
+    there is the model ``"tiling"``, which keeps a part of the photo and shows pieces of it that go
+    on into each other, without end and at any point of the plane.
 
     Parameters
     ----------
     image : (H, W) or (H, W, C) array_like, or Pillow image
         The photo, of at least 16 x 16 pixels and of any type that `tile` takes. Pixels that are not
         wholly opaque do not count. It becomes the map ``"basecolor"``.
-    directions : {"auto", "isotropic", "oriented"}
-        Which noise is fitted: isotropic is alike in all directions (the paper's kind); oriented has
-        bands that differ along two directions, for wood and the like; auto takes what suits the
-        photo.
+    model : {"auto", "wavelet", "oriented", "tiling"}
+        Which kind of texture is fitted: wavelet is noise that is alike in all directions (the
+        paper's kind); oriented is noise with bands that differ along two directions, for wood and
+        the like; auto takes the better of these; tiling lays parts of the photo beside each other
+        and blends them, for photos with shapes, and keeps a picture in the document.
     bands : {"round", "square"}
         The shape of isotropic noise's bands in the spectrum: round is alike in all directions;
         square is the paper's, Cook and DeRose's wavelet noise, and looks a little woven.
@@ -77,6 +83,15 @@ def fit_noise(
         each band leaks into others; direct is the paper's formula, which does not.
     histogram : {"kept", "normal"}
         Whether the photo's histograms are kept, or become normal distributions.
+    cell : int
+        Distance of the tiles of tiling in pixels, 0 to 4096: large shapes need large tiles, small
+        tiles repeat less. 0 is a fifth of the part that is kept.
+    sharpness : int
+        How narrow the borders are where the tiles of tiling blend, 1 to 16: 1 blends all over as
+        the paper does, 16 is nearly a cut.
+    keep : int
+        Most pixels along each side of the photo's part that tiling keeps, 64 to 8192; the document
+        has about 8 bytes for each of them.
     seed : int
         Chooses among the textures with the same statistics, 0 to 2**32 - 1.
     mask : (H, W) array_like, or Pillow image, optional
@@ -114,7 +129,9 @@ def fit_noise(
     The same arguments give the same texture on every run, for any number of threads.
 
     Source: A. Lagae, P. Vangorp, T. Lenaerts, P. Dutré, "Procedural Textures by Example" (2009),
-    sections 4 to 7; the noise: R. L. Cook, T. DeRose, "Wavelet Noise" (2005).
+    sections 4 to 7; the noise: R. L. Cook, T. DeRose, "Wavelet Noise" (2005); tiling: E. Heitz,
+    F. Neyret, "High-Performance By-Example Noise using a Histogram-Preserving Blending Operator"
+    (2018), with pieces that are chosen instead of drawn.
 
     Examples
     --------
@@ -261,6 +278,11 @@ class NoiseTexture:
         document: dict[str, Any] = json.loads(self.to_json())
         return document
 
+    @functools.cached_property
+    def _facts(self) -> dict[str, Any]:
+        """The document, read once: that of tiles has megabytes."""
+        return self.document
+
     @property
     def maps(self) -> tuple[str, ...]:
         """The names of the maps, in the order of their channels."""
@@ -270,7 +292,7 @@ class NoiseTexture:
     def channels(self) -> dict[str, slice]:
         """Which channels of a value each map has: ``values[..., texture.channels["height"]]``."""
         found, first = {}, 0
-        for one in self.document["maps"]:
+        for one in self._facts["maps"]:
             found[one["name"]] = slice(first, first + one["channels"])
             first += one["channels"]
         return found
@@ -278,25 +300,25 @@ class NoiseTexture:
     @property
     def size(self) -> tuple[int, int]:
         """Height and width of the photo in pixels."""
-        width, height = self.document["size"]
+        width, height = self._facts["size"]
         return height, width
 
     @property
     def seed(self) -> int:
         """The seed."""
-        seed: int = self.document["seed"]
+        seed: int = self._facts["seed"]
         return seed
 
     @property
     def score(self) -> float:
         """How well a texture of this kind fits the photo, 0 to 1."""
-        fit: float = self.document["score"]["fit"]
+        fit: float = self._facts["score"]["fit"]
         return fit
 
     @property
     def recommended(self) -> str:
-        """What fits the photo best: ``"wavelet"``, ``"oriented"`` or ``"none"``."""
-        recommended: str = self.document["score"]["recommended"]
+        """What fits best: ``"wavelet"``, ``"oriented"``, ``"tiling"`` or ``"none"``."""
+        recommended: str = self._facts["score"]["recommended"]
         return recommended
 
     def at(
@@ -387,7 +409,7 @@ class NoiseTexture:
             keep_contrast=bool(keep_contrast),
             threads=_threads(threads),
         )
-        n_channels = len(self.document["mean"])
+        n_channels = len(self._facts["mean"])
         return np.frombuffer(values, np.float32).reshape(*places.shape[:-1], n_channels)
 
     def render(
@@ -789,7 +811,7 @@ class NoiseTexture:
     def __repr__(self) -> str:
         """Say what it is in one line."""
         height, width = self.size
-        (model,) = self.document["model"]
+        (model,) = self._facts["model"]
         maps = ", ".join(self.maps)
         return f"NoiseTexture({model} noise like {height} x {width} of {maps}, seed {self.seed})"
 

@@ -26,7 +26,6 @@ __all__ = [
     "Axis",
     "Bands",
     "Costs",
-    "Directions",
     "Encoding",
     "ExportTarget",
     "Follow",
@@ -38,6 +37,7 @@ __all__ = [
     "Matching",
     "Measure",
     "Method",
+    "Model",
     "PathType",
     "Progress",
     "ProgressBar",
@@ -85,8 +85,8 @@ Matching: TypeAlias = Literal["color"] | Literal["correlation"]
 """By what a piece for a gap is chosen."""
 Seam: TypeAlias = Literal["graph"] | Literal["cut"] | Literal["linear"]
 """How pieces are joined."""
-Directions: TypeAlias = Literal["auto"] | Literal["isotropic"] | Literal["oriented"]
-"""Which noise is fitted."""
+Model: TypeAlias = Literal["auto"] | Literal["wavelet"] | Literal["oriented"] | Literal["tiling"]
+"""Which kind of procedural texture is fitted."""
 Bands: TypeAlias = Literal["round"] | Literal["square"]
 """The shape of a noise's bands in the spectrum."""
 Weights: TypeAlias = Literal["corrected"] | Literal["direct"]

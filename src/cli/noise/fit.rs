@@ -28,6 +28,7 @@ Examples:
   texforge noise fit plaster.jpg -o plaster.json --mask usable.png
   texforge noise fit rust.jpg -o rust.json --map roughness=rust_rough.png --map height=rust_height.png
   texforge noise fit sand.jpg -o other_sand.json --seed 7
+  texforge noise fit gravel.jpg -o gravel.json --model tiling
   texforge noise fit granite.jpg -o paper.json --bands square --weights direct
   texforge noise fit granite.jpg -o - | jq .score";
 
@@ -106,11 +107,14 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<serde_json::V
 
     notes.iter().for_each(|note| session.console.say(&format!("note: {note}")));
     let (elapsed, score) = (session.console.elapsed(), &texture.document().score);
+    let made_of = match report.bands {
+        0 => "tiles".to_owned(),
+        bands => format!("{bands} bands"),
+    };
     session.console.say(&format!(
-        "{}  {} bytes, {} bands, seed {}, fit {:.2} (recommended: {}), {}",
+        "{}  {} bytes, {made_of}, seed {}, fit {:.2} (recommended: {}), {}",
         shown(&request.output),
         report.bytes,
-        report.bands,
         ctx.seed,
         score.fit,
         score.recommended,

@@ -68,8 +68,11 @@ impl Document {
     }
 
     /// Multiplies the weights of every octave, the finest first; those beyond the list stay. Contrast
-    /// follows, in histograms as well.
+    /// follows, in histograms as well. A tiled texture has no octaves.
     pub fn gain(&mut self, gains: &[f64]) {
+        if matches!(self.model, Model::Tiling { .. }) {
+            return;
+        }
         let terms = self.terms();
         let variances = variances(&terms);
         self.reweigh([&variances, &variances], |weights| {

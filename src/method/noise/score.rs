@@ -6,6 +6,8 @@
 
 use rayon::prelude::*;
 
+use crate::signal::power::transform_even;
+
 /// What noise cannot hold of a photo's strongest channel. Each is about 0 for noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Structure {
@@ -16,6 +18,9 @@ pub struct Structure {
     pub patchiness: f64,
     /// Share of each octave's power that lies in other directions than if all were alike: mean as before.
     pub anisotropy: f64,
+    /// How strongly the photo repeats: the most by which its correlation with itself, going straight away
+    /// from no displacement, rises again; 1 is from opposite to alike.
+    pub periodicity: f64,
 }
 
 /// How much local power varies over octaves of noise, and how unlike directions are: by chance.
@@ -32,12 +37,14 @@ const DIRECTIONS: usize = 8;
 
 impl Structure {
     /// Nothing that noise lacks.
-    pub const NONE: Self = Self { kurtosis: 0.0, patchiness: 0.0, anisotropy: 0.0 };
+    pub const NONE: Self =
+        Self { kurtosis: 0.0, patchiness: 0.0, anisotropy: 0.0, periodicity: 0.0 };
 
     /// Of a plane whose histogram was made normal, and its spectrum.
     pub(super) fn of(plane: &[f32], shape: (usize, usize), power: &[f64]) -> Self {
         let (kurtosis, patchiness) = of_octaves(plane, shape);
-        Self { kurtosis, patchiness, anisotropy: anisotropy(power, shape) }
+        let periodicity = periodicity(&transform_even(power, shape), shape);
+        Self { kurtosis, patchiness, anisotropy: anisotropy(power, shape), periodicity }
     }
 
     /// How well isotropic noise fits, in 0..=1. The scale is chosen by eye: from 0.5 on the noise can be
@@ -52,9 +59,11 @@ impl Structure {
         libm::exp(-self.kurtosis - 2.0 * patchiness - 0.5 * self.anisotropy)
     }
 
-    /// The same of tiling and blending, which keeps all but what lies across borders.
+    /// The same of tiling and blending, which keeps all but what lies across borders, and falls out of
+    /// step with what repeats.
     pub fn tiling_fit(&self) -> f64 {
-        libm::exp(-0.3 * self.kurtosis - 0.6 * self.patchiness)
+        let rest = libm::exp(-0.18 * self.kurtosis - 0.36 * self.patchiness);
+        rest * (1.0 - self.periodicity)
     }
 }
 
@@ -121,6 +130,30 @@ pub(super) fn blurred(plane: &[f32], (height, width): (usize, usize), step: usiz
     out
 }
 
+/// How much correlation rises again on any way straight out, up to a third of the shorter side.
+fn periodicity(correlation: &[f64], (rows, cols): (usize, usize)) -> f64 {
+    const WAYS: u32 = 180;
+    let variance = correlation[0];
+    if variance <= 0.0 {
+        return 0.0;
+    }
+    let along = |way: u32| {
+        let angle = std::f64::consts::PI * f64::from(way) / f64::from(WAYS);
+        let (s, c) = (libm::sin(angle), libm::cos(angle));
+        let (mut least, mut rise) = (f64::MAX, 0.0f64);
+        for r in 0..rows.min(cols) / 3 {
+            let around =
+                |v: f64, n: usize| (v * r as f64).round().rem_euclid(n as f64) as usize % n;
+            let here = correlation[around(s, rows) * cols + around(c, cols)];
+            least = least.min(here);
+            rise = rise.max(here - least);
+        }
+        // From opposite to alike would be 2.
+        0.5 * rise / variance
+    };
+    (0..WAYS).map(along).fold(0.0, f64::max).clamp(0.0, 1.0)
+}
+
 /// How unlike the directions of each octave are.
 fn anisotropy(power: &[f64], (rows, cols): (usize, usize)) -> f64 {
     // Below, too few waves fit in to tell.
@@ -177,6 +210,19 @@ mod tests {
         let spots: Vec<f32> = noise.iter().map(|v| (v - 1.5).max(0.0)).collect();
         let of_spots = structure(&spots, (n, n));
         assert!(of_spots.isotropic_fit() < 0.2, "{of_spots:?}");
+    }
+
+    #[test]
+    fn a_chequer_repeats_and_noise_does_not() {
+        let n = 192;
+        let torus = Torus::new((n, n), Detail::Round);
+        let noise: Vec<f32> =
+            (0..n * n).map(|i| torus.at((i % n) as f64 / 4.0, (i / n) as f64 / 4.0)).collect();
+        assert!(structure(&noise, (n, n)).periodicity < 0.2);
+        let chequer: Vec<f32> = (0..n * n)
+            .map(|i| 2.0 * (((i % n) / 12 + (i / n) / 12) % 2) as f32 + 0.3 * noise[i])
+            .collect();
+        assert!(structure(&chequer, (n, n)).periodicity > 0.7);
     }
 
     #[test]

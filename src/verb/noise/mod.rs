@@ -49,7 +49,7 @@ pub struct NoiseReport {
     pub params: Vec<(&'static str, String)>,
     /// Width and height of the photo in pixels.
     pub photo_size: (usize, usize),
-    /// Number of bands.
+    /// Number of bands; 0 of a tiled texture.
     pub bands: usize,
     /// How well noise of the kind that was fitted fits, in 0..=1; from 0.5 on it can be taken for the
     /// photo at a glance.
@@ -62,6 +62,8 @@ pub struct NoiseReport {
     pub patchiness: f64,
     /// Share of the photo's power that lies in other directions than if all were alike.
     pub anisotropy: f64,
+    /// How strongly the photo repeats, as bricks do.
+    pub periodicity: f64,
     /// Bytes of the document.
     pub bytes: usize,
     /// Wall time in seconds of each stage, in order. The only part that differs between runs.
@@ -78,12 +80,15 @@ pub struct NoiseReport {
 /// sections 4 to 7). So maps stay correlated as they are in the photo. Transparent and masked pixels do
 /// not count; alpha itself is not fitted.
 ///
+/// With [`Kind::Tiling`] a part of the photo is kept instead, whose pieces are blended (Heitz and Neyret
+/// 2018; [`tiling`](crate::method::noise::tiling) says how, and what is different).
+///
 /// The same maps, mask and parameters give the same document on any number of threads.
 ///
 /// # Errors
-/// [`Error::Parameter`] for a parameter out of range, a seed of more than 32 bits, no map or two of one
-/// name; [`Error::TooSmall`] below
-/// 16 x 16 pixels; [`Error::SizeMismatch`] if a map or the mask has another size than the first map;
+/// [`Error::Parameter`] for a parameter out of range, cells too large for the photo, a seed of more than
+/// 32 bits, no map or two of one name; [`Error::TooSmall`] below 16 x 16 pixels, for tiles below 32 x 32
+/// without holes; [`Error::SizeMismatch`] if a map or the mask has another size than the first map;
 /// [`Error::NotFinite`]; [`Error::EmptyMask`]; [`Error::BadPicture`] if all is of one colour;
 /// [`Error::Memory`]; [`Error::Cancelled`].
 pub fn fit_noise(
@@ -106,7 +111,7 @@ fn run(
     params: &NoiseParams,
 ) -> Result<(NoiseTexture, NoiseReport)> {
     let begun = Instant::now();
-    let (height, width) = checked(maps)?;
+    let (height, width) = checked(maps, params)?;
     let mut notes = Vec::new();
     let usable = usable(maps, mask)?;
     let planes: Vec<Vec<f32>> = maps.iter().flat_map(|map| planes(map.picture)).collect();
@@ -177,6 +182,7 @@ fn run(
         kurtosis: structure.kurtosis,
         patchiness: structure.patchiness,
         anisotropy: structure.anisotropy,
+        periodicity: structure.periodicity,
         bytes: texture.to_json().len(),
         seconds: vec![("read", prepared), ("fit", begun.elapsed().as_secs_f64() - prepared)],
         notes,
@@ -187,7 +193,10 @@ fn run(
 /// From which anisotropy on noise has directions unless it is asked for otherwise.
 const DIRECTED: f64 = 0.2;
 
-/// From which fit on noise is recommended.
+/// From which periodicity on a photo is one of bricks, weave or the like.
+const REPEATS: f64 = 0.25;
+
+/// From which fit on a texture is recommended.
 const GOOD: f64 = 0.5;
 
 fn score(structure: &Structure, kind: Kind) -> Score {
@@ -213,14 +222,18 @@ fn advice(structure: &Structure, score: &Score, kind: Kind) -> Option<String> {
     } else {
         "its detail varies from place to place"
     };
+    let (verb, keeps) = if structure.periodicity > REPEATS {
+        ("regular", "what repeats in step")
+    } else {
+        ("tile", "shapes")
+    };
     match (score.recommended.as_str(), kind) {
-        ("none", Kind::Tiling) => Some(format!(
-            "tiling fits this photo badly ({fit:.2} of 1): its shapes are too large for it; `tile` or \
-             `regular` keep them"
-        )),
+        ("none", Kind::Tiling) => {
+            Some(format!("tiling fits this photo badly ({fit:.2} of 1); `{verb}` keeps {keeps}"))
+        }
         ("none", _) => Some(format!(
             "noise fits this photo badly ({fit:.2} of 1): {reason}, which noise does not have; \
-             `tile` keeps them"
+             `{verb}` keeps {keeps}"
         )),
         ("tiling", Kind::Wavelet | Kind::Oriented | Kind::Auto) => Some(format!(
             "noise fits this photo badly ({fit:.2} of 1): {reason}, which noise does not have; \
@@ -241,7 +254,7 @@ fn tiled(params: &NoiseParams) -> tiling::fit::Options {
 }
 
 /// The size that all maps have.
-fn checked(maps: &[NamedMap]) -> Result<(usize, usize)> {
+fn checked(maps: &[NamedMap], params: &NoiseParams) -> Result<(usize, usize)> {
     let Some(first) = maps.first() else {
         return Err(Error::parameter("maps", "at least one map", "none"));
     };
@@ -278,8 +291,13 @@ fn checked(maps: &[NamedMap]) -> Result<(usize, usize)> {
         return Err(Error::parameter("maps", expected, channels));
     }
     // Planes, their projection, and complex numbers of double width twice for a transform.
-    let per_pixel = (channels * 4 + 4 + 2 * 16 + 8) as u64;
-    let need = per_pixel.checked_mul((height * width) as u64);
+    let mut need = (channels * 4 + 4 + 2 * 16 + 8) * height * width;
+    if params.model == Kind::Tiling {
+        // The channels again; of the part that is kept the pictures, their levels, and what is compared.
+        let kept = height.min(params.keep) * width.min(params.keep);
+        need += channels * 4 * height * width + (channels * 24 + 80) * kept;
+    }
+    let need = Some(need as u64);
     ensure_available("the analysis of the photo", need)?;
     Ok((height, width))
 }

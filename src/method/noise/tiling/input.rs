@@ -185,10 +185,24 @@ impl Pyramid {
         &self.deviations
     }
 
-    /// Width, height and samples of the input.
-    pub(super) fn finest(&self) -> (usize, usize, &[f32]) {
-        let (width, height, samples) = &self.levels[0];
-        (*width, *height, samples)
+    /// The coarsest level that holds at least half of the variance of channels with these deviations.
+    pub(super) fn telling(&self, deviations: &[f64]) -> u32 {
+        let held = |kept: &Vec<f64>| -> f64 {
+            kept.iter().zip(deviations).map(|(k, d)| (k * d).powi(2)).sum()
+        };
+        let level =
+            self.deviations.iter().rposition(|kept| held(kept) >= 0.5 * held(&self.deviations[0]));
+        level.unwrap_or(0) as u32
+    }
+
+    /// Rows and columns of a level, and every channel's plane times its gain.
+    pub(super) fn planes(&self, level: u32, gains: &[f64]) -> ((usize, usize), Vec<Vec<f32>>) {
+        let (width, height, samples) = &self.levels[level as usize];
+        let plane = |(c, gain): (usize, &f64)| {
+            let samples = samples.iter().skip(c).step_by(self.channels);
+            samples.map(|v| *gain as f32 * v).collect()
+        };
+        ((*height, *width), gains.iter().enumerate().map(plane).collect())
     }
 
     /// Adds `weight` times the channels at a position in pixels of the photo: linear between pixels, and
@@ -248,4 +262,60 @@ fn squares(samples: &[f32], channels: usize) -> Vec<f64> {
         samples.iter().skip(c).step_by(channels).map(|&v| f64::from(v).powi(2)).sum::<f64>()
     };
     (0..channels).map(|c| sum(c) / pixels).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn input(channels: usize) -> (Input, Vec<Vec<f32>>) {
+        let plane =
+            |c: usize| (0..8 * 12).map(|i| ((i * (7 + c)) % 29) as f32 * 0.1 - 1.4).collect();
+        let planes: Vec<Vec<f32>> = (0..channels).map(plane).collect();
+        (Input::new([12, 8], &planes), planes)
+    }
+
+    #[test]
+    fn it_keeps_numbers_to_sixteen_bits() {
+        for channels in [1, 2, 3, 4, 7] {
+            let (input, planes) = input(channels);
+            assert!(input.is_of(channels));
+            assert_eq!(input.pictures.len(), channels.div_ceil(TOGETHER));
+            let stored = input.interleaved(channels);
+            for (i, value) in stored.iter().enumerate() {
+                let exact = planes[i % channels][i / channels];
+                assert!((value - exact).abs() < 0.51 / PER_DEVIATION as f32, "{value} {exact}");
+            }
+            let text = serde_json::to_string(&input).expect("text");
+            assert!(serde_json::from_str::<Input>(&text).expect("its own text") == input);
+        }
+    }
+
+    #[test]
+    fn middles_of_pixels_are_pixels_on_every_level() {
+        let (input, _) = input(2);
+        let pyramid = Pyramid::new(&input, 2, 2);
+        for (level, n) in [(0u8, 1usize), (1, 2), (2, 4)] {
+            for (y, x) in [(0, 0), (1, 2), (8 / n - 1, 12 / n - 1)] {
+                let mut out = [0.0; 2];
+                let at = [x, y].map(|i| (i as f64 + 0.5) * n as f64);
+                pyramid.add(at, f32::from(level), 1.0, &mut out);
+                for (c, out) in out.into_iter().enumerate() {
+                    let all = input.interleaved(2);
+                    let inside =
+                        (0..n * n).map(|i| all[((y * n + i / n) * 12 + x * n + i % n) * 2 + c]);
+                    let mean = inside.sum::<f32>() / (n * n) as f32;
+                    assert!((out - mean).abs() < 1e-5, "{level} {y} {x} {c}: {out} {mean}");
+                }
+            }
+        }
+        // Between pixels, and beyond the border.
+        let mut out = [0.0; 2];
+        pyramid.add([3.0, 0.5], 0.0, 1.0, &mut out);
+        let all = input.interleaved(2);
+        assert!((out[0] - 0.5 * (all[4] + all[6])).abs() < 1e-6);
+        let mut out = [0.0; 2];
+        pyramid.add([-50.0, -50.0], 0.0, 2.0, &mut out);
+        assert!((out[1] - 2.0 * all[1]).abs() < 1e-6);
+    }
 }

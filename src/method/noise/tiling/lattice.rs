@@ -110,3 +110,69 @@ impl Lattice {
         self.cell
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn weights_are_barycentric(x in -1e4..1e4f64, y in -1e4..1e4f64, a in 1u32..60, b in 1u32..90) {
+            let lattice = Lattice::endless([2 * a, b], 32);
+            let (corners, _) = lattice.triangle([x, y]);
+            let sum = |of: &dyn Fn(&Vertex) -> f64| -> f64 {
+                corners.iter().map(|c| f64::from(c.weight) * of(c)).sum()
+            };
+            prop_assert!((sum(&|_| 1.0) - 1.0).abs() < 1e-5);
+            prop_assert!((sum(&|c| c.at[0]) - x).abs() < 1e-2);
+            prop_assert!((sum(&|c| c.at[1]) - y).abs() < 1e-2);
+            for corner in corners {
+                prop_assert!(corner.weight >= 0.0);
+                let alone = lattice.weight([x - corner.at[0], y - corner.at[1]]);
+                prop_assert!((alone - f64::from(corner.weight)).abs() < 1e-5);
+            }
+        }
+
+        #[test]
+        fn sides_begin_where_the_neighbours_say(x in -500.0..500.0f64, y in -500.0..500.0f64) {
+            let lattice = Lattice::endless([20, 17], 32);
+            let (corners, begins) = lattice.triangle([x, y]);
+            for (k, pair) in [[0, 1], [0, 2], [1, 2]].into_iter().enumerate() {
+                let [from, to] = if corners[pair[0]].index == begins[k] { pair } else { [pair[1], pair[0]] };
+                prop_assert_eq!(corners[from].index, begins[k]);
+                let [right, down] = NEIGHBOURS[k];
+                let way = [20.0 * (right as f64 + 0.5 * down as f64), 17.0 * down as f64];
+                let is = [0, 1].map(|axis| corners[to].at[axis] - corners[from].at[axis]);
+                prop_assert_eq!(is, way);
+            }
+        }
+
+        #[test]
+        fn a_fitting_lattice_goes_round(
+            width in 1u32..300, height in 1u32..300, x in -500.0..500.0f64, y in -500.0..500.0f64,
+            right in -3i32..4, down in -3i32..4,
+        ) {
+            let period = [f64::from(width), f64::from(height)];
+            let lattice = Lattice::fitting([40, 34], period);
+            let [a, b] = lattice.cell();
+            prop_assert!(a <= 40.0 && b <= 34.0);
+            // A sixteenth keeps sums exact, so that a point stays in its triangle.
+            let [x, y] = [x, y].map(|v| (16.0 * v).round() / 16.0 + 1e-3);
+            let way = [f64::from(right) * period[0], f64::from(down) * period[1]];
+            let (here, begins) = lattice.triangle([x, y]);
+            let (there, others) = lattice.triangle([x + way[0], y + way[1]]);
+            prop_assert_eq!(begins, others);
+            for (here, there) in here.iter().zip(there) {
+                prop_assert!(here.index < lattice.len());
+                prop_assert_eq!(here.index, there.index);
+                prop_assert!((here.weight - there.weight).abs() < 1e-4);
+                for axis in 0..2 {
+                    // Whole pixels for a period of whole pixels.
+                    prop_assert!((there.at[axis] - here.at[axis] - way[axis]).abs() < 1e-6);
+                    prop_assert!((here.at[axis] - here.at[axis].round()).abs() < 1e-6);
+                }
+            }
+        }
+    }
+}

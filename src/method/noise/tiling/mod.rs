@@ -22,7 +22,7 @@ use crate::base::error::Result;
 use crate::method::noise::score::blurred;
 use input::{Input, Pyramid};
 use lattice::Lattice;
-use table::{Places, Samples, Search, Table};
+use table::{Places, Plane, Search, Table};
 
 /// How a texture is tiled and blended.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -89,7 +89,7 @@ impl Layout {
 
     /// Chooses the table for a seed, given the standard deviations of the channels.
     pub(super) fn choose(&mut self, ctx: &Ctx, deviations: &[f64], seed: u32) -> Result<()> {
-        let pyramid = Pyramid::new(&self.input, deviations.len(), 0);
+        let pyramid = Pyramid::new(&self.input, deviations.len(), self.halvings().min(SCREENED));
         let lattice = Lattice::endless(self.cell, SIDE);
         if let Some(places) = self.places() {
             self.table = choose(ctx, &pyramid, &lattice, places, self.sharpness, deviations, seed)?;
@@ -102,6 +102,9 @@ impl Layout {
 pub fn steps() -> u64 {
     table::steps(&Lattice::endless([2, 2], SIDE))
 }
+
+/// Coarsest level of the input in which most choices are compared.
+const SCREENED: u32 = 2;
 
 /// How often an input can be halved until a cell is some pixels.
 fn halvings(cell: [u32; 2]) -> u32 {
@@ -118,25 +121,22 @@ fn choose(
     deviations: &[f64],
     seed: u32,
 ) -> Result<Table> {
-    let (width, height, samples) = pyramid.finest();
-    let shape = (height, width);
-    let channels = deviations.len();
+    let level = pyramid.telling(deviations).min(SCREENED);
     // Each channel as strong as it is in the texture.
-    let plane = |c: usize| -> Vec<f32> {
-        let gain = deviations[c] as f32;
-        samples.iter().skip(c).step_by(channels).map(|v| gain * v).collect()
-    };
-    let planes: Vec<Vec<f32>> = (0..channels).map(plane).collect();
+    let (coarse_shape, coarse) = pyramid.planes(level, deviations);
+    let (shape, exact) = pyramid.planes(0, deviations);
     // What lies within a pixel or two of where it should need not be told apart.
-    let smooth: Vec<Vec<f32>> = planes.iter().map(|plane| blurred(plane, shape, 1)).collect();
-    let inputs = [smooth, planes].map(|planes| interleaved(&planes));
-    let [smooth, exact] = inputs.each_ref().map(|samples| Samples { shape, channels, samples });
-    table::choose(ctx, &Search { lattice, places, sharpness, smooth, exact, seed })
-}
-
-fn interleaved(planes: &[Vec<f32>]) -> Vec<f32> {
-    let pixels = planes.first().map_or(0, Vec::len);
-    (0..pixels).flat_map(|i| planes.iter().map(move |plane| plane[i])).collect()
+    let smooth: Vec<Vec<f32>> = exact.iter().map(|plane| blurred(plane, shape, 1)).collect();
+    let search = Search {
+        lattice,
+        places,
+        sharpness,
+        coarse: Plane::new(level, coarse_shape, &coarse),
+        smooth: Plane::new(0, shape, &smooth),
+        exact: Plane::new(0, shape, &exact),
+        seed,
+    };
+    table::choose(ctx, &search)
 }
 
 /// A layout made ready to give values at points.

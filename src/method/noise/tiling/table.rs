@@ -66,19 +66,23 @@ impl Places {
     /// All that leave a cell around a vertex within an input of this size, thinned out to 256.
     pub fn new(size: [u32; 2], cell: [u32; 2]) -> Option<Self> {
         // A pixel more, for interpolation.
-        let first = cell.map(|n| n + 1);
+        let first = cell.map(|n| n.saturating_add(1));
         let mut places = Self { first, step: [1; 2], count: [1; 2] };
         for axis in 0..2 {
-            let rest = size[axis].checked_sub(2 * first[axis])?;
+            let rest = size[axis].checked_sub(first[axis].saturating_mul(2))?;
             places.step[axis] = rest.div_ceil(255).max(1);
             places.count[axis] = rest / places.step[axis] + 1;
         }
         Some(places)
     }
 
-    /// The place of a choice.
+    /// The place of a choice: the corner of a pixel, which lies to the right and below.
     pub fn at(&self, choice: [u8; 2]) -> [f64; 2] {
-        std::array::from_fn(|k| f64::from(self.first[k] + self.step[k] * u32::from(choice[k])))
+        self.pixel(choice).map(f64::from)
+    }
+
+    fn pixel(&self, choice: [u8; 2]) -> [i32; 2] {
+        std::array::from_fn(|k| (self.first[k] + self.step[k] * u32::from(choice[k])) as i32)
     }
 }
 
@@ -87,40 +91,54 @@ pub(super) struct Search<'a> {
     pub(super) lattice: &'a Lattice,
     pub(super) places: Places,
     pub(super) sharpness: u32,
-    /// The input a little blurred, and as it is; each channel as strong as in the texture.
-    pub(super) smooth: Samples<'a>,
-    pub(super) exact: Samples<'a>,
+    /// The input small, a little blurred, and as it is.
+    pub(super) coarse: Plane,
+    pub(super) smooth: Plane,
+    pub(super) exact: Plane,
     pub(super) seed: u32,
 }
 
-/// Samples of the input, pixels interleaved.
-#[derive(Clone, Copy)]
-pub(super) struct Samples<'a> {
-    /// Rows and columns.
-    pub(super) shape: (usize, usize),
-    pub(super) channels: usize,
-    pub(super) samples: &'a [f32],
+/// Channels that are compared: the strongest.
+const COMPARED: usize = 4;
+
+/// The input at full size or smaller, each channel as strong as it is in the texture.
+pub(super) struct Plane {
+    /// How often it was halved.
+    level: u32,
+    rows: usize,
+    cols: usize,
+    pixels: Vec<[f32; COMPARED]>,
 }
 
-impl<'a> Samples<'a> {
-    /// The pixel so far from a place.
+impl Plane {
+    /// Of the channels' planes, the strongest first.
+    pub(super) fn new(level: u32, (rows, cols): (usize, usize), planes: &[Vec<f32>]) -> Self {
+        let pixel = |i| std::array::from_fn(|c| planes.get(c).map_or(0.0, |plane| plane[i]));
+        Self { level, rows, cols, pixels: (0..rows * cols).map(pixel).collect() }
+    }
+
+    /// The pixel that holds one of the input at full size, or the nearest one.
     #[inline]
-    fn at(&self, place: [f64; 2], from: [i64; 2]) -> &'a [f32] {
-        let (height, width) = self.shape;
-        let [x, y] = std::array::from_fn(|k| place[k] as i64 + from[k]);
-        let (x, y) = (x.clamp(0, width as i64 - 1), y.clamp(0, height as i64 - 1));
-        &self.samples[(y as usize * width + x as usize) * self.channels..][..self.channels]
+    fn at(&self, [x, y]: [i32; 2]) -> [f32; COMPARED] {
+        let clamped = |v: i32, n: usize| ((v >> self.level).max(0) as usize).min(n - 1);
+        self.pixels[clamped(y, self.rows) * self.cols + clamped(x, self.cols)]
     }
 }
 
 /// Random places that are tried for a vertex in each pass.
-const TRIED: u32 = 96;
+const TRIED: usize = 512;
+
+/// How many of them, those that fit best by a few samples, are looked at closely.
+const CLOSELY: usize = 24;
 
 /// How often all vertices are chosen.
-const PASSES: u32 = 2;
+const PASSES: u32 = 3;
 
 /// Samples of an overlap.
 const SAMPLES: usize = 96;
+
+/// The first of them, which are spread over all of it.
+const FEW: usize = 16;
 
 /// Share of the greatest weight below which an overlap does not matter.
 const FAINT: f64 = 0.03;
@@ -133,12 +151,15 @@ const USED: f32 = 0.5;
 const STAGE: u32 = 0x7ab1e;
 
 /// Places of an overlap, from the vertex, and their weights, whose sum is 1.
-type Overlap = Vec<([i64; 2], f32)>;
+type Overlap = Vec<([i32; 2], f32)>;
+
+/// What a neighbour shows at places from a vertex, and their weights.
+type Shown = Vec<([i32; 2], f32, [f32; COMPARED])>;
 
 /// A vertex' neighbour as it lies there: its choice, its way, and which overlap.
 struct Beside {
-    choice: [f64; 2],
-    way: [i64; 2],
+    place: [i32; 2],
+    way: [i32; 2],
     overlap: usize,
     /// Whether the overlap is seen from the neighbour.
     turned: bool,
@@ -199,7 +220,7 @@ impl Search<'_> {
                 .map(f64::round);
             let w = weight(at);
             if w > FAINT * 0.5 {
-                places.push((at.map(|v| v as i64), w as f32));
+                places.push((at.map(|v| v as i32), w as f32));
             }
         }
         let sum: f32 = places.iter().map(|(_, w)| w).sum();
@@ -214,9 +235,9 @@ impl Search<'_> {
         let both = NEIGHBOURS.iter().enumerate().flat_map(|(k, way)| [(k, 1, way), (k, -1, way)]);
         let one = |(overlap, sign, way): (usize, i64, &[i64; 2])| {
             let (index, there) = self.lattice.vertex(i + sign * way[0], j + sign * way[1]);
-            let choice = self.places.at(chosen[index].filter(|_| index != vertex)?);
-            let way = std::array::from_fn(|k| (there[k] - here[k]).round() as i64);
-            Some(Beside { choice, way, overlap, turned: sign < 0 })
+            let place = self.places.pixel(chosen[index].filter(|_| index != vertex)?);
+            let way = std::array::from_fn(|k| (there[k] - here[k]).round() as i32);
+            Some(Beside { place, way, overlap, turned: sign < 0 })
         };
         both.filter_map(one).collect()
     }
@@ -234,20 +255,27 @@ impl Search<'_> {
         let mut rng = Rng::new(u64::from(self.seed), STAGE, pass, vertex as u64);
         let count = self.places.count;
         let random = |rng: &mut Rng| count.map(|n| rng.below(n) as u8);
-        let mut tried: Vec<[u8; 2]> = before.into_iter().collect();
-        tried.extend((0..TRIED).map(|_| random(&mut rng)));
-        // What the neighbours show there.
-        let shown: Vec<_> =
-            beside.iter().map(|b| Self::shown(self.smooth, b, &overlaps[b.overlap])).collect();
-        let cost = |choice: [u8; 2]| self.cost(choice, &shown);
-        let costs: Vec<f32> =
-            tried.par_iter().with_min_len(24).map(|&choice| cost(choice)).collect();
-        let mut sorted = costs.clone();
-        sorted.sort_by(f32::total_cmp);
-        let per_use = USED * sorted[sorted.len() / 2] / usage.mean();
+        let tried: Vec<[u8; 2]> = (0..TRIED).map(|_| random(&mut rng)).collect();
+        let shown = |plane: &Plane, samples: usize| -> Vec<Shown> {
+            let one = |b: &Beside| shown(plane, b, &overlaps[b.overlap], samples);
+            beside.iter().map(one).collect()
+        };
+        let (few, all) = (shown(&self.coarse, FEW), shown(&self.smooth, SAMPLES));
+        let roughly = |choice: [u8; 2]| cost(&self.coarse, self.places.pixel(choice), &few);
+        let closely = |choice: [u8; 2]| cost(&self.smooth, self.places.pixel(choice), &all);
+        let mut tried: Vec<(f32, [u8; 2])> = tried
+            .into_par_iter()
+            .with_min_len(64)
+            .map(|choice| (roughly(choice), choice))
+            .collect();
+        let (_, &mut (median, _), _) = tried.select_nth_unstable_by(TRIED / 2, by_cost);
+        let per_use = USED * median / usage.mean();
         let total = |choice: [u8; 2], cost: f32| cost + per_use * usage.at(choice);
-        let all = tried.iter().zip(&costs).map(|(&choice, &c)| (choice, total(choice, c)));
-        let mut best = all.reduce(|a, b| if b.1 < a.1 { b } else { a }).unwrap_or(([0; 2], 0.0));
+        tried.iter_mut().for_each(|(cost, choice)| *cost = total(*choice, *cost));
+        tried.select_nth_unstable_by(CLOSELY, by_cost);
+        let kept = tried[..CLOSELY].iter().map(|&(_, choice)| choice).chain(before);
+        let kept = kept.map(|choice| (choice, total(choice, closely(choice))));
+        let mut best = kept.reduce(|a, b| if b.1 < a.1 { b } else { a }).unwrap_or(([0; 2], 0.0));
         // Downhill from there: lines join by single pixels.
         for by in [4i32, 2, 1] {
             let middle = best.0;
@@ -255,7 +283,7 @@ impl Search<'_> {
                 let moved: [i32; 2] = std::array::from_fn(|k| i32::from(middle[k]) + by * way[k]);
                 if (0..2).all(|k| (0..count[k] as i32).contains(&moved[k])) {
                     let choice = moved.map(|v| v as u8);
-                    let total = total(choice, cost(choice));
+                    let total = total(choice, closely(choice));
                     if total < best.1 {
                         best = (choice, total);
                     }
@@ -265,44 +293,16 @@ impl Search<'_> {
         best.0
     }
 
-    /// Places from a vertex, their weights, and the samples that a neighbour has there.
-    fn shown<'a>(
-        samples: Samples<'a>,
-        beside: &Beside,
-        overlap: &Overlap,
-    ) -> Vec<([i64; 2], f32, &'a [f32])> {
-        let one = |&(at, weight): &([i64; 2], f32)| {
-            let (mine, theirs) = if beside.turned {
-                (std::array::from_fn(|k| at[k] + beside.way[k]), at)
-            } else {
-                (at, std::array::from_fn(|k| at[k] - beside.way[k]))
-            };
-            (mine, weight, samples.at(beside.choice, theirs))
-        };
-        overlap.iter().map(one).collect()
-    }
-
-    /// Mean square difference of a choice from its neighbours.
-    fn cost(&self, choice: [u8; 2], shown: &[Vec<([i64; 2], f32, &[f32])>]) -> f32 {
-        let choice = self.places.at(choice);
-        let mut sum = 0.0;
-        for (at, weight, theirs) in shown.iter().flatten() {
-            let mine = self.smooth.at(choice, *at);
-            let square: f32 = mine.iter().zip(*theirs).map(|(a, b)| (a - b) * (a - b)).sum();
-            sum += weight * square;
-        }
-        sum
-    }
-
     /// Correlation with the three neighbours ahead.
     fn alike(&self, vertex: usize, chosen: &[Option<[u8; 2]>], overlaps: &[Overlap; 3]) -> [u8; 3] {
         let mut alike = [0; 3];
         // A vertex that is its own neighbour is not there.
         for beside in self.beside(vertex, chosen).iter().filter(|b| !b.turned) {
-            let mine = self.places.at(chosen[vertex].unwrap_or([0; 2]));
+            let [x, y] = self.places.pixel(chosen[vertex].unwrap_or([0; 2]));
             let (mut products, mut squares) = (0.0f32, [0.0f32; 2]);
-            for (at, weight, theirs) in Self::shown(self.exact, beside, &overlaps[beside.overlap]) {
-                for (a, b) in self.exact.at(mine, at).iter().zip(theirs) {
+            let overlap = &overlaps[beside.overlap];
+            for ([dx, dy], weight, theirs) in shown(&self.exact, beside, overlap, SAMPLES) {
+                for (a, b) in self.exact.at([x + dx, y + dy]).iter().zip(theirs) {
                     products += weight * a * b;
                     squares[0] += weight * a * a;
                     squares[1] += weight * b * b;
@@ -314,6 +314,42 @@ impl Search<'_> {
         }
         alike
     }
+}
+
+/// What a neighbour shows at the first samples of an overlap.
+fn shown(plane: &Plane, beside: &Beside, overlap: &Overlap, samples: usize) -> Shown {
+    let one = |&(at, weight): &([i32; 2], f32)| {
+        let (mine, theirs): ([i32; 2], [i32; 2]) = if beside.turned {
+            (std::array::from_fn(|k| at[k] + beside.way[k]), at)
+        } else {
+            (at, std::array::from_fn(|k| at[k] - beside.way[k]))
+        };
+        (mine, weight, plane.at(std::array::from_fn(|k| beside.place[k] + theirs[k])))
+    };
+    overlap.iter().take(samples).map(one).collect()
+}
+
+/// Mean square difference from the neighbours of what lies at a place of the input.
+fn cost(plane: &Plane, [x, y]: [i32; 2], shown: &[Shown]) -> f32 {
+    let mut sum = 0.0;
+    for shown in shown {
+        let (mut squares, mut weights) = (0.0, 0.0);
+        for ([dx, dy], weight, theirs) in shown {
+            let mine = plane.at([x + dx, y + dy]);
+            let [a, b, c, d] =
+                std::array::from_fn(|k| (mine[k] - theirs[k]) * (mine[k] - theirs[k]));
+            squares += weight * ((a + b) + (c + d));
+            weights += weight;
+        }
+        // Tiles that go round after a few pixels may not overlap anywhere.
+        sum += if weights > 0.0 { squares / weights } else { 0.0 };
+    }
+    sum
+}
+
+/// By cost, and as the sort is unstable, by choice.
+fn by_cost(a: &(f32, [u8; 2]), b: &(f32, [u8; 2])) -> std::cmp::Ordering {
+    a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))
 }
 
 /// How often places are used.
