@@ -210,4 +210,24 @@ mod tests {
             assert!((solid.at(point) - solid.at(moved)).abs() < 1e-4);
         }
     }
+
+    #[test]
+    fn the_coefficients_never_change() {
+        // Documents made by older versions depend on them.
+        let sums = [Detail::Square, Detail::Round, Detail::RoundFine].map(|detail| {
+            let solid = Solid::new(detail);
+            let fold = |sum: u32, &v: &i16| hash(sum ^ u32::from(v as u16));
+            let at = solid.at([3.3, -7.1, 1e6 + 0.7]).to_bits();
+            let on = solid.projected([3.3, -7.1, 50.7], [0.6, 0.0, 0.8]).to_bits();
+            [solid.integers().iter().fold(0, fold), solid.scale().to_bits(), at, on]
+        });
+        assert_eq!(
+            sums,
+            [
+                [619_731_280, 977_272_868, 1_057_555_096, 3_173_336_399],
+                [2_481_073_840, 972_688_724, 1_038_719_816, 1_066_694_695],
+                [3_878_518_687, 981_350_170, 3_174_213_708, 1_054_669_596]
+            ]
+        );
+    }
 }

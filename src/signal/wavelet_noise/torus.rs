@@ -287,5 +287,13 @@ mod tests {
                 .fold(0u32, |sum, &v| super::super::hash(sum ^ v as u16 as u32))
         });
         assert_eq!(sums, [2_869_209_762, 2_483_746_438, 2_215_425_495, 434_750_818]);
+        let values = [Detail::Square, Detail::Round, Detail::RoundFine, upright].map(|detail| {
+            let torus = Torus::new(side, detail);
+            (0..1000).fold(torus.scale().to_bits(), |sum, i| {
+                let value = torus.at(f64::from(i) * 3.7 - 2e3, f64::from(i * i) * 0.71);
+                super::super::hash(sum ^ value.to_bits())
+            })
+        });
+        assert_eq!(values, [1_270_492_417, 1_488_887_137, 2_748_157_639, 861_491_236]);
     }
 }
