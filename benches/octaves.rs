@@ -2,7 +2,8 @@
 //! itself.
 //!
 //! `octaves WHAT THREADS RUNS`: WHAT is `picture`, `picture-1` (of one octave alone), `plane` or `space`. Prints
-//! the number of values of one octave that a run gives, and every run's wall time in seconds.
+//! the number of values of one octave that a run gives, and every run's seconds: of one thread those that the
+//! process computed, which other work on the machine disturbs least, of more those that went by.
 
 #![expect(
     clippy::print_stdout,
@@ -10,8 +11,9 @@
     reason = "a program for one script, which sees its panics"
 )]
 
-use std::time::Instant;
+mod common;
 
+use common::{process_cpu_seconds, wall_seconds};
 use texforge::base::rng::Rng;
 use texforge::{Ctx, Filter, NoiseTexture, RenderParams, SampleType, Samples};
 
@@ -35,7 +37,9 @@ fn main() {
         println!("octaves WHAT THREADS RUNS: see benches/octaves.rs");
         return;
     };
-    let ctx = Ctx::new(0, threads.parse().unwrap()).unwrap();
+    let threads: usize = threads.parse().unwrap();
+    let now = if threads == 1 { process_cpu_seconds } else { wall_seconds };
+    let ctx = Ctx::new(0, threads).unwrap();
     let eight = "0.0284,0.0671,0.0879,0.0858,0.0406,0.0238,0.0134,0.0095";
     let texture = texture(if what == "picture-1" { "0.1" } else { eight });
     let place = |i: usize, axis: u32| f64::from(Rng::new(3, axis, 0, i as u64).next_u32()) / 1e5;
@@ -55,11 +59,9 @@ fn main() {
     let first = values();
     assert!(first.len() == SIDE * SIDE && first.iter().all(|v| v.is_finite()));
     let seconds = |_| {
-        let start = Instant::now();
-        let again = values();
-        let seconds = start.elapsed().as_secs_f64();
-        assert_eq!(again.len(), first.len());
-        seconds
+        let start = now();
+        assert_eq!(values().len(), first.len());
+        now() - start
     };
     let seconds: Vec<f64> = (0..runs.parse().unwrap()).map(seconds).collect();
     println!("{} {seconds:?}", SIDE * SIDE * texture.document().terms().len());

@@ -66,11 +66,11 @@ fn places<const N: usize>(i: usize, sides: [usize; N]) -> [usize; N] {
 
 /// Transforms along every axis, the first one first.
 fn transform(values: &mut Vec<Complex<f64>>, plans: &[std::sync::Arc<dyn Fft<f64>>]) {
+    const LINES: usize = 16;
     let mut turned = values.clone();
     for plan in plans {
         // The first axis becomes the last; after all of them it is the first again.
         let (rest, n) = (values.len() / plan.len(), plan.len());
-        const LINES: usize = 16;
         for (band, out) in turned.chunks_mut(LINES * n).enumerate() {
             transposed_band(values, rest, band * LINES, out);
         }
