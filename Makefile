@@ -17,7 +17,7 @@ QUALITY ?=
 LATTICES ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-rust test-python test-blender lint format gallery quality lattices extracts regular-gallery noise-gallery readme-pictures bench bench-peers bench-record wheel ci fuzz clean
+.PHONY: help setup demo test test-rust test-python test-blender lint format gallery quality lattices extracts regular-gallery noise-gallery readme-pictures bench bench-peers bench-noise-peers bench-record wheel ci fuzz clean
 
 help: ## List the targets.
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -108,6 +108,9 @@ bench: ## Measure the kernels.
 
 bench-peers: $(BIN)/.ready ## Compare with G'MIC and texture-synthesis (PHOTO=file, BENCH="--large ...").
 	$(BIN)/python benches/peers.py $(if $(PHOTO),"$(PHOTO)") $(BENCH)
+
+bench-noise-peers: $(BIN)/.ready ## Compare noise with FastNoiseSIMD, in one run (BENCH="--rounds 9").
+	$(BIN)/python benches/noise_peers.py $(BENCH)
 
 bench-record: $(BIN)/.ready ## Measure all and keep it in benches/record/.
 	TEXFORGE_BENCH_TABLE=$(CURDIR)/target/kernels.md $(CARGO) bench --locked --bench kernels

@@ -20,8 +20,13 @@ import subprocess
 import sys
 import tempfile
 import time
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 ROOT = Path(__file__).resolve().parent.parent
 RECORDS = ROOT / "benches" / "record"
@@ -63,15 +68,25 @@ class Contender:
         return min(self.times(what))
 
 
+@contextmanager
+def cores_for(threads: int) -> Iterator[None]:
+    """Let processes that are started meanwhile have one core if they have one thread."""
+    cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
+    if threads == 1 and cores:
+        os.sched_setaffinity(0, cores[-1:])  # Inherited by the child.
+    try:
+        yield
+    finally:
+        if threads == 1 and cores:
+            os.sched_setaffinity(0, cores)
+
+
 def measure(contender: Contender) -> None:
     """Run the command once; one thread means one core."""
     if contender.out:
         contender.out.unlink(missing_ok=True)
-    cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
     environment = dict(os.environ, OMP_NUM_THREADS=str(contender.threads))
-    if contender.threads == 1 and cores:
-        os.sched_setaffinity(0, cores[-1:])  # Inherited by the child.
-    try:
+    with cores_for(contender.threads):
         start = time.perf_counter()
         process = subprocess.Popen(
             contender.command,
@@ -86,9 +101,6 @@ def measure(contender: Contender) -> None:
         wall = time.perf_counter() - start
         process.returncode = os.waitstatus_to_exitcode(status)
         process.stderr.close()
-    finally:
-        if contender.threads == 1 and cores:
-            os.sched_setaffinity(0, cores)
     if process.returncode != 0 or (contender.out and not contender.out.exists()):
         last = said.decode(errors="replace").strip().splitlines()[-1:] or ["no message"]
         contender.problem = f"exit status {process.returncode}: {last[0][:120]}"
@@ -394,12 +406,16 @@ def built(args: argparse.Namespace) -> None:
         )
         args.texforge = str(target_directory(cargo) / "release" / "texforge")
     if args.fields and args.field is None:
-        command = [cargo, "bench", "--locked", "--bench", "field", "--no-run"]
-        command += ["--message-format", "json"]
-        said = subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True)
-        messages = [json.loads(line) for line in said.stdout.splitlines() if line.startswith("{")]
-        programs = [m["executable"] for m in messages if m.get("executable")]
-        args.field = programs[-1]
+        args.field = bench_program(cargo, "field")
+
+
+def bench_program(cargo: str, name: str) -> str:
+    """Build one of our small programs for a script; return where it is."""
+    command = [cargo, "bench", "--locked", "--bench", name, "--no-run", "--message-format", "json"]
+    said = subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True)
+    messages = [json.loads(line) for line in said.stdout.splitlines() if line.startswith("{")]
+    programs = [str(m["executable"]) for m in messages if m.get("executable")]
+    return programs[-1]
 
 
 def target_directory(cargo: str) -> Path:

@@ -25,12 +25,26 @@ pub(crate) fn cpu_seconds() -> f64 {
         now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9
     }
     #[cfg(not(unix))]
+    wall_seconds()
+}
+
+/// CPU time of all threads of this process in seconds.
+pub(crate) fn process_cpu_seconds() -> f64 {
+    #[cfg(unix)]
     {
-        use std::sync::OnceLock;
-        use std::time::Instant;
-        static START: OnceLock<Instant> = OnceLock::new();
-        START.get_or_init(Instant::now).elapsed().as_secs_f64()
+        let now = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+        now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9
     }
+    #[cfg(not(unix))]
+    wall_seconds()
+}
+
+/// Seconds that went by.
+pub(crate) fn wall_seconds() -> f64 {
+    use std::sync::OnceLock;
+    use std::time::Instant;
+    static START: OnceLock<Instant> = OnceLock::new();
+    START.get_or_init(Instant::now).elapsed().as_secs_f64()
 }
 
 /// CPU seconds that `work` takes on this thread.

@@ -134,7 +134,7 @@ impl Program {
             })
             .collect();
         let tile = |detail| {
-            let torus = Torus::new((Torus::SIDE, Torus::SIDE), detail);
+            let torus = Torus::shared(detail);
             (torus.integers().to_vec(), torus.scale())
         };
         let channels =

@@ -1,7 +1,7 @@
 //! `texforge noise` as a user meets it: files, exit statuses, what is refused.
 
 use proptest::prelude::*;
-use texforge::{Ctx, ErrorKind, NoiseTexture, RenderParams, Samples};
+use texforge::{Ctx, ErrorKind, NoiseTexture, RenderParams, SampleType, Samples};
 
 use crate::support::{Folder, Pixels};
 
@@ -197,6 +197,60 @@ mod render {
                 }
                 prop_assert_eq!(&Samples::U8(rows), picture.samples());
             }
+        }
+    }
+
+    /// By how much more power waves that run across have than those that run down, as a share, in the
+    /// octaves of 1, 2 and 4 waves a picture on.
+    fn directions(values: &[f32], n: usize) -> [f64; 3] {
+        let turn = |k: usize| std::f64::consts::TAU * (k % n) as f64 / n as f64;
+        let table: Vec<_> = (0..n).map(|k| turn(k).sin_cos()).collect();
+        let (mut sums, mut powers) = ([0.0; 3], [0.0; 3]);
+        for (x, y) in (0..8).flat_map(|x| (0..16).map(move |y| (x, y as i32 - 8))) {
+            let square = f64::from(x * x + y * y);
+            let octave = (0.5 * square.max(0.1).log2()).floor() as i32;
+            if !(0..3).contains(&octave) || (x == 0 && y < 0) {
+                continue;
+            }
+            let (mut re, mut im) = (0.0, 0.0);
+            for (i, &v) in values.iter().enumerate() {
+                let down = (y.rem_euclid(n as i32)) as usize * (i / n);
+                let (sin, cos) = table[(x as usize * (i % n) + down) % n];
+                (re, im) = (re + f64::from(v) * cos, im + f64::from(v) * sin);
+            }
+            let power = re * re + im * im;
+            powers[octave as usize] += power;
+            sums[octave as usize] += power * f64::from(x * x - y * y) / square;
+        }
+        [0, 1, 2].map(|k| sums[k] / powers[k])
+    }
+
+    #[test]
+    fn small_tiles_have_no_stripes() {
+        let ctx = Ctx::new(0, 2).expect("threads");
+        for bands in ["round", "square"] {
+            let mut mean = [0.0; 3];
+            for seed in 0..8 {
+                let json = format!(
+                    r#"{{"format":"texforge-noise","version":1,"seed":{seed},"size":[64,64],"maps":[
+                    {{"name":"height","kind":"data","encoding":"data","channels":1}}],
+                    "mean":[0.5],"matrix":[[1.0]],"model":{{"wavelet":{{"bands":"{bands}",
+                    "channels":[{{"weights":[0.1,0.1,0.1,0.1,0.1]}}]}}}},
+                    "score":{{"fit":0.8,"recommended":"wavelet"}}}}"#
+                );
+                let texture = NoiseTexture::from_json(&json).expect("a document");
+                let params = RenderParams {
+                    tileable: true,
+                    samples: SampleType::F32,
+                    ..RenderParams::new((64, 64))
+                };
+                let picture = texture.render(&ctx, &params).expect("a picture").remove(0).2;
+                let Samples::F32(values) = picture.samples() else { panic!("floats") };
+                let found = directions(values, 64);
+                mean.iter_mut().zip(found).for_each(|(mean, d)| *mean += d / 8.0);
+            }
+            // By chance octaves that overlap strengthen or weaken each other.
+            assert!(mean.iter().all(|d| d.abs() < 0.15), "{bands}: {mean:?}");
         }
     }
 

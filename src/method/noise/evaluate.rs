@@ -1,16 +1,17 @@
 //! [`Evaluator`]: a document made ready to give values.
 
-use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
+
+use pulp::Arch;
 
 use crate::base::ctx::Ctx;
 use crate::base::error::Result;
 use crate::method::noise::document::{Document, Model, Term};
+use crate::method::noise::points::{PlaneNoise, SolidNoise, axes};
 use crate::method::noise::shape::Shape;
 use crate::method::noise::tiling::table::Places;
 use crate::method::noise::tiling::{Layout, Tiling};
-use crate::signal::wavelet_noise::spectrum::{ALIKE, at_pixels};
-use crate::signal::wavelet_noise::{Detail, Solid, Torus};
+use crate::signal::wavelet_noise::{BLOCK, Solid, Torus};
 
 /// How bands that a sample cannot hold are treated.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,21 +74,8 @@ impl Evaluator {
     /// Of a valid document.
     pub fn new(document: Document) -> Self {
         let terms = document.terms();
-        let mut made: HashMap<Detail, Arc<Torus>> = HashMap::new();
-        let side = (Torus::SIDE, Torus::SIDE);
-        let mut torus = |t: &Term| {
-            made.entry(t.detail).or_insert_with(|| Arc::new(Torus::new(side, t.detail))).clone()
-        };
-        let tori = terms.iter().map(&mut torus).collect();
-        let mut known = HashMap::new();
-        let variance = |t: &Term| {
-            let levels = t.levels.map(|level| level.min(ALIKE));
-            *known.entry((t.detail, levels)).or_insert_with(|| at_pixels(t.detail, levels))
-        };
-        let at_pixels: Vec<f64> = match document.model {
-            Model::Tiling { .. } => document.variances(),
-            _ => terms.iter().map(variance).collect(),
-        };
+        let tori = terms.iter().map(|t| Torus::shared(t.detail)).collect();
+        let at_pixels = document.variances();
         let channels = document.channels().iter().enumerate().map(|(c, channel)| {
             let offset = |(t, term): (usize, &Term)| {
                 let [x, y] = term.levels;
@@ -213,17 +201,19 @@ impl Evaluator {
     /// The same bits as [`raster`](super::raster::render) gives at those of its pixels' middles.
     pub fn plane(&self, points: &[[f64; 2]], filter: Filter, out: &mut [f32]) {
         let filtered = self.filtered(filter);
-        let mut noise = vec![0.0; self.channels.len()];
-        for (point, out) in points.iter().zip(out.chunks_exact_mut(self.channels())) {
-            if let Some(tiling) = &self.tiling {
+        if let Some(tiling) = &self.tiling {
+            let mut noise = vec![0.0; self.channels.len()];
+            for (point, out) in points.iter().zip(out.chunks_exact_mut(self.channels())) {
                 self.tiles(tiling, &filtered, *point, &mut noise);
-            } else {
-                for ((value, channel), f) in noise.iter_mut().zip(&self.channels).zip(&filtered) {
-                    *value = self.plane_noise(channel, f, *point);
-                }
+                self.colour(&filtered, &noise, out);
             }
-            self.colour(&filtered, &noise, out);
+            return;
         }
+        self.blocks(points, &filtered, out, |_, points, noise| {
+            let points = &axes(points.iter().map(|point| self.turned(*point)));
+            let block = PlaneNoise { evaluator: self, filtered: &filtered, points, noise };
+            Arch::new().dispatch(block);
+        });
     }
 
     /// The independent channels of a tiled texture at a point.
@@ -238,18 +228,26 @@ impl Evaluator {
         self.channels.iter().map(|channel| channel.variances.iter().sum::<f64>().sqrt()).collect()
     }
 
-    fn plane_noise(&self, channel: &ChannelEvaluator, filtered: &Filtered, point: [f64; 2]) -> f32 {
-        let [x, y] = self.turned(point);
-        let mut sum = 0.0;
-        for (t, &weight) in filtered.weights.iter().enumerate() {
-            if weight != 0.0 {
-                let (term, offset) = (&self.terms[t], channel.offsets[t]);
-                let x = position(x, offset[0], term.levels[0]);
-                let y = position(y, offset[1], term.levels[1]);
-                sum += weight * self.tori[t].at(x, y);
+    /// The channels at points, of whose noise `add_noise` makes a block at a time; it is told which point is
+    /// the first.
+    fn blocks<P>(
+        &self,
+        points: &[P],
+        filtered: &[Filtered],
+        out: &mut [f32],
+        add_noise: impl Fn(usize, &[P], &mut [[f32; BLOCK]]),
+    ) {
+        let mut noise = vec![[0.0; BLOCK]; self.channels.len()];
+        let mut one = vec![0.0; self.channels.len()];
+        let blocks = points.chunks(BLOCK).zip(out.chunks_mut(BLOCK * self.channels()));
+        for (k, (points, out)) in blocks.enumerate() {
+            noise.as_flattened_mut().fill(0.0);
+            add_noise(k * BLOCK, points, &mut noise);
+            for (i, out) in out.chunks_exact_mut(self.channels()).enumerate() {
+                one.iter_mut().zip(&noise).for_each(|(one, noise)| *one = noise[i]);
+                self.colour(filtered, &one, out);
             }
         }
-        sum
     }
 
     /// A point in the directions of the noise.
@@ -268,36 +266,20 @@ impl Evaluator {
         filter: Filter,
         out: &mut [f32],
     ) {
-        let solids = self.solids.get_or_init(|| {
-            let mut made: HashMap<Detail, Arc<Solid>> = HashMap::new();
-            let mut of = |d| made.entry(d).or_insert_with(|| Arc::new(Solid::new(d))).clone();
-            self.terms.iter().map(|t| of(t.detail)).collect()
-        });
+        let solids = self
+            .solids
+            .get_or_init(|| self.terms.iter().map(|t| Solid::shared(t.detail)).collect());
         let filtered = self.filtered(filter);
         // As strong as the bands are at the photo's pixels.
         let gains: Vec<f32> = self.at_pixels.iter().map(|v| v.sqrt() as f32).collect();
-        let mut noise = vec![0.0; self.channels.len()];
-        for (i, (point, out)) in
-            points.iter().zip(out.chunks_exact_mut(self.channels())).enumerate()
-        {
-            for ((value, channel), f) in noise.iter_mut().zip(&self.channels).zip(&filtered) {
-                *value = 0.0;
-                for (t, &weight) in f.weights.iter().enumerate() {
-                    if weight == 0.0 {
-                        continue;
-                    }
-                    let level = self.terms[t].levels[0];
-                    let at =
-                        std::array::from_fn(|k| position(point[k], channel.offsets[t][k], level));
-                    let noise = match normals {
-                        Some(normals) => solids[t].projected(at, normals[i]),
-                        None => solids[t].at(at),
-                    };
-                    *value += weight * gains[t] * noise;
-                }
-            }
-            self.colour(&filtered, &noise, out);
-        }
+        self.blocks(points, &filtered, out, |first, points, noise| {
+            let normals = normals.map(|normals| &normals[first..][..points.len()]);
+            let points = &axes(points.iter().copied());
+            let (filtered, gains) = (&filtered, &gains);
+            let block =
+                SolidNoise { evaluator: self, filtered, solids, gains, points, normals, noise };
+            Arch::new().dispatch(block);
+        });
     }
 
     /// The channels of a value of the independent channels' `noise`.
@@ -329,7 +311,7 @@ fn shaped(shape: &Shape, u: f32, lost: f32) -> f32 {
 
 /// Position of `at`, in pixels, on the torus of a band. The middle of the photo's first pixel is a
 /// coefficient of the finest band.
-#[inline]
+#[inline(always)]
 pub(super) fn position(at: f64, offset: f64, level: u32) -> f64 {
     // Exact but for the sum: the divisor is a power of two.
     (at - 0.5 + offset) / f64::from(1u32 << level)

@@ -271,12 +271,15 @@ fn spectrum(
         power.iter_mut().for_each(|p| *p *= gain);
         power
     };
-    let ranks = Ranks::new(plane, exemplar, variance);
+    let (ranks, plain) = rayon::join(
+        || Ranks::new(plane, exemplar, variance),
+        || (!(options.direct && options.histogram)).then(|| power(plane)),
+    );
     let normal = (with_structure || options.direct).then(|| ranks.gaussianised(plane, exemplar));
-    let power = match &normal {
-        Some(normal) if options.direct && options.histogram => power(normal),
-        _ if options.direct || !options.histogram => power(plane),
-        _ => before_shape(&Shape::new(&ranks.knots), &power(plane), exemplar.shape),
+    let power = match (&normal, plain) {
+        (_, Some(plain)) if options.direct || !options.histogram => plain,
+        (_, Some(plain)) => before_shape(&Shape::new(&ranks.knots), &plain, exemplar.shape),
+        (normal, None) => power(normal.as_deref().unwrap_or(plane)),
     };
     let structure = normal
         .filter(|_| with_structure)
@@ -305,14 +308,13 @@ fn before_shape(shape: &Shape, power: &[f64], size: (usize, usize)) -> Vec<f64> 
         let part = if high > low { ((s - low) / (high - low)).clamp(0.0, 1.0) } else { 0.0 };
         2.0 * ((above - 1) as f64 + part) / STEPS as f64 - 1.0
     };
-    let mut correlation = transform_even(power, size);
-    let variance = correlation[0];
+    let variance: f64 = power.iter().sum();
     if variance <= 0.0 {
         return power.to_vec();
     }
-    correlation.par_iter_mut().for_each(|c| *c = unshaped(*c / variance));
+    let correlation = transform_even(power, size, |c| unshaped(c / variance));
     let scale = variance / power.len() as f64;
-    transform_even(&correlation, size).iter().map(|p| p * scale).collect()
+    transform_even(&correlation, size, |p| p * scale)
 }
 
 /// The non-negative x for which `matrix` x comes nearest to `target`, counted in shares of `target` (but
@@ -324,21 +326,33 @@ pub(super) fn least_squares(matrix: &[Vec<f64>], target: &[f64], least: f64) -> 
     let weights: Vec<f64> =
         target.iter().map(|t| 1.0 / t.max(least.max(1e-6) * most).max(1e-30)).collect();
     let n = matrix.first().map_or(0, Vec::len);
-    let scaled: Vec<Vec<f64>> =
-        matrix.iter().zip(&weights).map(|(row, w)| row.iter().map(|a| a * w).collect()).collect();
-    let mut left: Vec<f64> = target.iter().zip(&weights).map(|(t, w)| t * w).collect();
+    let column =
+        |j: usize| -> Vec<f64> { matrix.iter().zip(&weights).map(|(row, w)| row[j] * w).collect() };
+    let columns: Vec<Vec<f64>> = (0..n).map(column).collect();
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let products: Vec<Vec<f64>> =
+        columns.iter().map(|a| columns.iter().map(|b| dot(a, b)).collect()).collect();
+    let scaled: Vec<f64> = target.iter().zip(&weights).map(|(t, w)| t * w).collect();
+    // How fast half the squared error falls with each unknown.
+    let mut slopes: Vec<f64> = columns.iter().map(|column| dot(column, &scaled)).collect();
     let mut x = vec![0.0; n];
     for _ in 0..SWEEPS {
+        let mut moved = false;
         for j in 0..n {
-            let square: f64 = scaled.iter().map(|row| row[j] * row[j]).sum();
+            let square = products[j][j];
             if square <= 0.0 {
                 continue;
             }
-            let slope: f64 = scaled.iter().zip(&left).map(|(row, l)| row[j] * l).sum();
-            let to = (x[j] + slope / square).max(0.0);
+            let to = (x[j] + slopes[j] / square).max(0.0);
             let by = to - x[j];
-            x[j] = to;
-            left.iter_mut().zip(&scaled).for_each(|(l, row)| *l -= by * row[j]);
+            if by != 0.0 {
+                moved = true;
+                x[j] = to;
+                slopes.iter_mut().zip(&products[j]).for_each(|(slope, p)| *slope -= by * p);
+            }
+        }
+        if !moved {
+            break;
         }
     }
     x

@@ -10,6 +10,7 @@ pub mod evaluate;
 pub mod fit;
 mod morph;
 pub mod oriented;
+mod points;
 mod ranks;
 pub mod raster;
 pub mod score;

@@ -1,5 +1,7 @@
 //! [`Ranks`]: the histogram of a channel.
 
+use rayon::prelude::*;
+
 use crate::method::noise::fit::Exemplar;
 use crate::method::noise::shape::{KNOTS, Shape};
 use crate::signal::normal;
@@ -12,8 +14,9 @@ const STEPS_OF_VALUE: usize = 1 << 16;
 pub(super) struct Ranks {
     least: f32,
     per_step: f64,
-    /// For every step of value, a normally distributed number of the same rank and the plane's variance.
-    normals: Vec<f32>,
+    /// How many samples there are of every step of value.
+    counts: Vec<u32>,
+    variance: f64,
     /// The histogram's values at the knots, of mean 0 and exactly the plane's variance.
     pub(super) knots: [f64; KNOTS.len()],
 }
@@ -25,24 +28,34 @@ impl Ranks {
             || plane.iter().enumerate().filter(|(i, _)| exemplar.counts(*i)).map(|(_, v)| *v);
         let (least, most) = values().fold((f32::MAX, f32::MIN), |(a, b), v| (a.min(v), b.max(v)));
         let per_step = (STEPS_OF_VALUE - 1) as f64 / f64::from(most - least).max(f64::MIN_POSITIVE);
-        let mut ranks = Self { least, per_step, normals: Vec::new(), knots: [0.0; KNOTS.len()] };
-        let (mut counts, mut sums) = (vec![0u32; STEPS_OF_VALUE], vec![0.0f64; STEPS_OF_VALUE]);
+        let counts = vec![0u32; STEPS_OF_VALUE];
+        let mut ranks = Self { least, per_step, counts, variance, knots: [0.0; KNOTS.len()] };
+        let mut sums = vec![0.0f64; STEPS_OF_VALUE];
         for v in values() {
-            counts[ranks.step(v)] += 1;
-            sums[ranks.step(v)] += f64::from(v);
+            let step = ranks.step(v);
+            ranks.counts[step] += 1;
+            sums[step] += f64::from(v);
         }
-        ranks.knots = knots(&counts, &sums, variance);
-        let total = f64::from(counts.iter().sum::<u32>());
-        let deviation = variance.sqrt();
+        ranks.knots = knots(&ranks.counts, &sums, variance);
+        ranks
+    }
+
+    /// For every step of value, a normally distributed number of the same rank and the plane's variance.
+    fn normals(&self) -> Vec<f32> {
+        let total = f64::from(self.counts.iter().sum::<u32>());
+        let deviation = self.variance.sqrt();
         // Equal samples share the middle of their ranks.
         let mut below = 0.0;
-        let normal = |&count: &u32| {
+        let rank = |&count: &u32| {
             let rank = below + 0.5 * f64::from(count);
             below += f64::from(count);
+            rank
+        };
+        let ranks: Vec<f64> = self.counts.iter().map(rank).collect();
+        let normal = |(&count, rank): (&u32, &f64)| {
             if count == 0 { 0.0 } else { (normal::quantile(rank / total) * deviation) as f32 }
         };
-        ranks.normals = counts.iter().map(normal).collect();
-        ranks
+        self.counts.par_iter().zip(&ranks).map(normal).collect()
     }
 
     fn step(&self, value: f32) -> usize {
@@ -52,10 +65,11 @@ impl Ranks {
     /// The samples replaced by normally distributed ones of the same ranks (section 5); those that are
     /// not usable are the mean.
     pub(super) fn gaussianised(&self, plane: &[f32], exemplar: &Exemplar) -> Vec<f32> {
+        let normals = self.normals();
         let normal = |(i, &v): (usize, &f32)| {
-            if exemplar.counts(i) { self.normals[self.step(v)] } else { 0.0 }
+            if exemplar.counts(i) { normals[self.step(v)] } else { 0.0 }
         };
-        plane.iter().enumerate().map(normal).collect()
+        plane.par_iter().enumerate().map(normal).collect()
     }
 }
 

@@ -1,6 +1,5 @@
 //! [`render`]: pictures of a procedural texture.
 
-use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -8,8 +7,9 @@ use rayon::prelude::*;
 
 use crate::base::ctx::Ctx;
 use crate::base::error::Result;
+use crate::method::noise::document::{MOST_CHANNELS, Term};
 use crate::method::noise::evaluate::{Evaluator, Filter, position};
-use crate::signal::wavelet_noise::{Detail, Row, Torus};
+use crate::signal::wavelet_noise::{Row, Torus, hash};
 
 /// Which part of a texture is rendered.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,9 +25,13 @@ pub struct View {
     pub tileable: bool,
 }
 
-/// The coefficients of a term and where pixels lie on them, along an axis.
+/// A torus of fewer coefficients a side holds so few waves that channels would be seen to share them.
+const OWN: usize = 64;
+
+/// The coefficients of a term and where pixels lie on them.
 struct Grid {
-    torus: Arc<Torus>,
+    /// Of every channel.
+    tori: Vec<Arc<Torus>>,
     /// Coefficients to a pixel of the photo, along x and y; of a texture that need not go round the
     /// inverse of a power of two.
     per_pixel: Option<[f64; 2]>,
@@ -78,10 +82,11 @@ pub fn render(
     let columns: Vec<Vec<Option<Row>>> = evaluator
         .channels
         .iter()
-        .map(|channel| {
+        .enumerate()
+        .map(|(c, channel)| {
             let terms = channel.offsets.par_iter().enumerate();
             let row = |(t, offset): (usize, &[f64; 3])| {
-                let n = grids[t].as_ref()?.torus.shape().1;
+                let n = grids[t].as_ref()?.tori[c].shape().1;
                 place(0.5, 0, 0.0, t)?;
                 let places = (0..cols).filter_map(|x| place(at(x, 0), 0, offset[0], t));
                 Some(Row::new(places, n))
@@ -109,7 +114,7 @@ pub fn render(
                     let (Some(grid), Some(row)) = (&grids[t], &columns[c][t]) else { continue };
                     let Some(y) = place(at(y, 1), 1, channel.offsets[t][1], t) else { continue };
                     if weight != 0.0 {
-                        grid.torus.add_row(row, y, weight, combined, noise);
+                        grid.tori[c].add_row(row, y, weight, combined, noise);
                     }
                 }
             }
@@ -125,11 +130,10 @@ pub fn render(
 
 /// The coefficients of every term; `None` for one too coarse for a texture that goes round.
 fn grids(evaluator: &Evaluator, view: &View) -> Vec<Option<Grid>> {
-    let mut made: HashMap<((usize, usize), Detail), Arc<Torus>> = HashMap::new();
-    let terms = evaluator.terms.iter().zip(&evaluator.tori);
-    let grid = |(term, torus): (&crate::method::noise::document::Term, &Arc<Torus>)| {
+    let grid = |(t, (term, torus)): (usize, (&Term, &Arc<Torus>))| {
+        let channels = evaluator.channels.len();
         if !view.tileable {
-            return Some(Grid { torus: torus.clone(), per_pixel: None });
+            return Some(Grid { tori: vec![torus.clone(); channels], per_pixel: None });
         }
         let (rows, cols) = view.size;
         // The nearest even number of coefficients a period, in as many repetitions as needed.
@@ -142,11 +146,16 @@ fn grids(evaluator: &Evaluator, view: &View) -> Vec<Option<Grid>> {
         };
         let (across, per_x) = fitting(cols, term.levels[0])?;
         let (down, per_y) = fitting(rows, term.levels[1])?;
-        let torus = made
-            .entry(((down, across), term.detail))
-            .or_insert_with(|| Arc::new(Torus::new((down, across), term.detail)))
-            .clone();
-        Some(Grid { torus, per_pixel: Some([per_x, per_y]) })
+        let stream = hash(evaluator.document().seed).wrapping_add((t * MOST_CHANNELS) as u32);
+        let torus = |c: usize| {
+            Arc::new(Torus::even((down, across), term.detail, stream.wrapping_add(c as u32)))
+        };
+        let tori = if down.min(across) < OWN {
+            (0..channels).map(torus).collect()
+        } else {
+            vec![torus(0); channels]
+        };
+        Some(Grid { tori, per_pixel: Some([per_x, per_y]) })
     };
-    terms.map(grid).collect()
+    evaluator.terms.par_iter().zip(&evaluator.tori).enumerate().map(grid).collect()
 }

@@ -7,6 +7,7 @@
 use rayon::prelude::*;
 
 use crate::signal::power::transform_even;
+use crate::signal::wavelet_noise::spectrum::signs;
 
 /// What noise cannot hold of a photo's strongest channel. Each is about 0 for noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,7 +44,7 @@ impl Structure {
     /// Of a plane whose histogram was made normal, and its spectrum.
     pub(super) fn of(plane: &[f32], shape: (usize, usize), power: &[f64]) -> Self {
         let (kurtosis, patchiness) = of_octaves(plane, shape);
-        let periodicity = periodicity(&transform_even(power, shape), shape);
+        let periodicity = periodicity(&transform_even(power, shape, |c| c), shape);
         Self { kurtosis, patchiness, anisotropy: anisotropy(power, shape), periodicity }
     }
 
@@ -80,17 +81,19 @@ fn of_octaves(plane: &[f32], (rows, cols): (usize, usize)) -> (f64, f64) {
         let step = 1usize << octave;
         let smoother = blurred(&smooth, (height, width), step);
         let squares: Vec<f32> =
-            smooth.iter().zip(&smoother).map(|(a, b)| (a - b) * (a - b)).collect();
+            smooth.par_iter().zip(&smoother).map(|(a, b)| (a - b) * (a - b)).collect();
         let around = blurred(&squares, (height, width), step);
         let around = blurred(&around, (height, width), 2 * step);
         // Without the border, which is mirrored.
         let border = (2 * step).min(height.min(width) / 4);
         let inner = |values: &[f32], power: i32| {
-            let lines = (border..height - border).map(|y| {
+            let lines = (border..height - border).into_par_iter().map(|y| {
                 let line = &values[y * width + border..(y + 1) * width - border];
                 line.iter().map(|&v| f64::from(v).powi(power)).sum::<f64>()
             });
-            lines.sum::<f64>() / ((height - 2 * border) * (width - 2 * border)) as f64
+            // In this order on any number of threads.
+            let sums: Vec<f64> = lines.collect();
+            sums.iter().sum::<f64>() / ((height - 2 * border) * (width - 2 * border)) as f64
         };
         let power = inner(&squares, 1);
         let mean = inner(&around, 1);
@@ -116,8 +119,14 @@ pub(super) fn blurred(plane: &[f32], (height, width): (usize, usize), step: usiz
     };
     let mut across = vec![0.0; plane.len()];
     across.par_chunks_mut(width).zip(plane.par_chunks(width)).for_each(|(to, from)| {
-        for (x, to) in to.iter_mut().enumerate() {
-            *to = TAPS.iter().enumerate().map(|(k, t)| t * from[mirrored(x, k, width)]).sum();
+        // Away from the ends nothing is mirrored.
+        let (first, end) = (2 * step, width.saturating_sub(2 * step).max(2 * step));
+        for x in (0..first.min(width)).chain(end..width) {
+            to[x] = TAPS.iter().enumerate().map(|(k, t)| t * from[mirrored(x, k, width)]).sum();
+        }
+        for x in first..end {
+            let at = &from[x - first..];
+            to[x] = TAPS.iter().enumerate().map(|(k, t)| t * at[k * step]).sum();
         }
     });
     let mut out = vec![0.0; plane.len()];
@@ -158,25 +167,44 @@ fn periodicity(correlation: &[f64], (rows, cols): (usize, usize)) -> f64 {
 fn anisotropy(power: &[f64], (rows, cols): (usize, usize)) -> f64 {
     // Below, too few waves fit in to tell.
     let octaves = rows.min(cols).ilog2().saturating_sub(3).max(1) as usize;
-    let mut sums = vec![[0.0; DIRECTIONS]; octaves];
-    let mut counts = vec![[0u32; DIRECTIONS]; octaves];
-    let signed = |k: usize, n: usize| {
-        if 2 * k > n { k as f64 / n as f64 - 1.0 } else { k as f64 / n as f64 }
+    // Between a direction and the next; x does not fall below 0, as opposite frequencies are one wave.
+    let bounds: [f64; DIRECTIONS] = std::array::from_fn(|k| {
+        let turns = (k as f64 + 0.5) / DIRECTIONS as f64 - 0.5;
+        libm::tan(turns * std::f64::consts::PI)
+    });
+    let row = |(r, line): (usize, &[f64])| {
+        let (mut sums, mut counts) =
+            (vec![[0.0; DIRECTIONS]; octaves], vec![[0.0; DIRECTIONS]; octaves]);
+        let turned = if 2 * r > rows { r as f64 - rows as f64 } else { r as f64 };
+        let fy = turned / rows as f64;
+        for (q, power) in line[..=cols / 2].iter().enumerate() {
+            let fx = q as f64 / cols as f64;
+            let square = fx * fx + fy * fy;
+            let (mut octave, mut lower) = (0, 0.0625);
+            while square <= lower && octave < octaves {
+                (octave, lower) = (octave + 1, lower / 4.0);
+            }
+            if square <= 0.25 && octave < octaves {
+                let direction = bounds.iter().filter(|b| fy >= **b * fx).count() % DIRECTIONS;
+                sums[octave][direction] += power * signs(q, cols);
+                counts[octave][direction] += signs(q, cols);
+            }
+        }
+        (sums, counts)
     };
-    for (i, power) in power.iter().enumerate() {
-        let (fx, fy) = (signed(i % cols, cols), signed(i / cols, rows));
-        let octave = (-libm::log2((fx * fx + fy * fy).sqrt()) - 1.0).floor();
-        if octave >= 0.0 && octave < octaves as f64 {
-            let turns = libm::atan2(fy, fx) / std::f64::consts::PI + 2.0;
-            let sector = (turns * DIRECTIONS as f64 + 0.5) as usize % DIRECTIONS;
-            sums[octave as usize][sector] += power;
-            counts[octave as usize][sector] += 1;
+    // A row's share, then all rows in order.
+    let shares: Vec<_> = power.par_chunks(cols).enumerate().map(row).collect();
+    let mut sums = vec![[0.0; DIRECTIONS]; octaves];
+    let mut counts = vec![[0.0; DIRECTIONS]; octaves];
+    for (more, of) in &shares {
+        for (all, share) in [(&mut sums, more), (&mut counts, of)] {
+            let all = all.as_flattened_mut().iter_mut();
+            all.zip(share.as_flattened()).for_each(|(all, share)| *all += share);
         }
     }
     let (mut powers, mut unlike) = (0.0, 0.0);
     for (sums, counts) in sums.iter().zip(&counts) {
-        let means: Vec<f64> =
-            sums.iter().zip(counts).map(|(s, c)| s / f64::from((*c).max(1))).collect();
+        let means: Vec<f64> = sums.iter().zip(counts).map(|(s, c)| s / c.max(1.0)).collect();
         let (power, total) = (sums.iter().sum::<f64>(), means.iter().sum::<f64>());
         if total > 0.0 {
             let even = 1.0 / DIRECTIONS as f64;

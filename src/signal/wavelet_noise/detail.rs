@@ -84,46 +84,71 @@ impl Part {
 }
 
 impl Detail {
-    /// Amplitude that the coefficients have at a frequency in cycles a coefficient, each within
-    /// -0.5..=0.5; before they are brought to unit variance. `None` for [`Detail::Square`], which is no
-    /// function of frequency alone.
-    pub(super) fn amplitude<const N: usize>(self, f: [f64; N]) -> Option<f64> {
-        let f = f.map(f64::abs);
-        let radius = || f.iter().map(|f| f * f).sum::<f64>().sqrt();
-        let all = |transfer: fn(f64) -> f64| f.iter().map(|f| transfer(*f)).product::<f64>();
+    /// Amplitude that the coefficients have at a frequency; before they are brought to unit variance.
+    /// `None` for [`Detail::Square`], which is no function of frequency alone.
+    pub(super) fn amplitude<const N: usize>(self, along: [&Frequency; N]) -> Option<f64> {
+        let radius = || along.iter().map(|a| a.f * a.f).sum::<f64>().sqrt();
+        let factors = || along.iter().map(|a| a.factor).product::<f64>();
         match self {
             Self::Square => None,
             Self::Round => {
                 let r = radius();
-                Some(rise(r) * fall(r) / all(spline_transfer))
+                Some(rise(r) * fall(r) / factors())
             }
-            Self::RoundFine => Some(rise(radius()) / all(knot_transfer)),
-            Self::Axes(parts) => Some(parts.iter().zip(f).map(|(p, f)| p.amplitude(f)).product()),
+            Self::RoundFine => Some(rise(radius()) / factors()),
+            Self::Axes(_) => Some(factors()),
         }
     }
 
     /// Power to expect of the coefficients at frequencies of x and y, before they are brought to unit
     /// variance.
-    pub(super) fn power(self, [x, y]: [Frequency; 2]) -> f64 {
-        match self.amplitude([x.f, y.f]) {
+    pub(super) fn power(self, [x, y]: [&Frequency; 2]) -> f64 {
+        match self.amplitude([x, y]) {
             Some(amplitude) => amplitude * amplitude,
             // White noise less what half the resolution holds of it, averaged over both parities.
             None => 1.0 - 2.0 * x.shared * y.shared + x.held * y.held,
         }
     }
 
-    /// A frequency along one axis, within -0.5..=0.5 cycles a coefficient.
-    pub(super) fn frequency(self, f: f64) -> Frequency {
+    /// A frequency along one axis (0: x), within -0.5..=0.5 cycles a coefficient.
+    pub(super) fn frequency(self, axis: usize, f: f64) -> Frequency {
+        let f = f.abs();
+        let factor = match self {
+            Self::Square => 1.0,
+            Self::Round => spline_transfer(f),
+            Self::RoundFine => knot_transfer(f),
+            Self::Axes(parts) => parts[axis].amplitude(f),
+        };
         let (shared, held) = if self == Self::Square { halves(f) } else { (0.0, 0.0) };
-        Frequency { f, shared, held }
+        Frequency { f, factor, shared, held }
     }
+
+    /// The frequencies 0, 1, ... waves on `n` coefficients along an axis, up to the highest.
+    pub(super) fn frequencies(self, axis: usize, n: usize) -> Vec<Frequency> {
+        (0..=n / 2).map(|k| self.frequency(axis, k as f64 / n as f64)).collect()
+    }
+
+    /// A number below [`Detail::COUNT`] for each.
+    pub(super) fn index(self) -> usize {
+        match self {
+            Self::Square => 0,
+            Self::Round => 1,
+            Self::RoundFine => 2,
+            Self::Axes([x, y]) => 3 + 3 * x as usize + y as usize,
+        }
+    }
+
+    /// How many there are.
+    pub(super) const COUNT: usize = 12;
 }
 
-/// A frequency along one axis, and of [`Detail::Square`] what half the resolution has of it.
+/// A frequency along one axis, and what a detail makes of it whatever it is along the others.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Frequency {
-    /// In cycles a coefficient.
-    pub(super) f: f64,
+    /// In cycles a coefficient, without sign.
+    f: f64,
+    /// The axis' share of the amplitude: of round details, what that is divided by.
+    factor: f64,
     /// The spectrum of white noise with what half the resolution holds of it.
     shared: f64,
     /// The power of that.

@@ -1,12 +1,18 @@
 //! [`Solid`]: wavelet noise in space.
 
+use std::sync::{Arc, OnceLock};
+
 use super::filters::hold;
-use super::{Detail, SPLINE_PRODUCTS, fourier, hash, quantised, spline, spline_weights, white};
+use super::fourier::{Strength, filter};
+use super::places::{BEYOND, BLOCK, Places};
+use super::{Detail, SPLINE_PRODUCTS, hash, quantised, spline, spline_weights, white, wrapped};
 
 /// A torus of coefficients of wavelet noise in space, whose unit of length is one coefficient.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solid {
     integers: Vec<i16>,
+    /// The integers, scaled, slice by slice (z), column by column (x), so that neighbours along y follow each
+    /// other; the first of every axis once more beyond the last.
     values: Vec<f32>,
     scale: f32,
     /// What brings [`Solid::projected`] to unit variance.
@@ -15,12 +21,20 @@ pub struct Solid {
 
 const N: usize = Solid::SIDE;
 
-/// Side of the torus along each axis for masks: a power of two.
-const MASK: i64 = N as i64 - 1;
+/// Values from a column to the next, and from a slice to the next.
+const COLUMN: usize = N + BEYOND;
+const SLICE: usize = (N + 2) * COLUMN;
 
 impl Solid {
     /// Side of the torus.
     pub const SIDE: usize = 64;
+
+    /// The coefficients of a detail that has no axes of its own, made once in a process.
+    pub fn shared(detail: Detail) -> Arc<Self> {
+        static MADE: [OnceLock<Arc<Solid>>; Detail::COUNT] =
+            [const { OnceLock::new() }; Detail::COUNT];
+        MADE[detail.index()].get_or_init(|| Arc::new(Self::new(detail))).clone()
+    }
 
     /// The coefficients of a detail that has no axes of its own.
     pub fn new(detail: Detail) -> Self {
@@ -28,11 +42,18 @@ impl Solid {
             square()
         } else {
             let mut volume = white_volume(18);
-            fourier::filter(&mut volume, [N; 3], |f| detail.amplitude(f).unwrap_or(1.0));
+            let along = detail.frequencies(0, N);
+            filter(&mut volume, [N; 3], Strength::Kept, |at| {
+                detail.amplitude(at.map(|k| &along[k])).unwrap_or(1.0)
+            });
             volume
         };
         let (integers, scale) = quantised(&coefficients, variance);
-        let values: Vec<f32> = integers.iter().map(|&v| f32::from(v) * scale).collect();
+        let mut values = Vec::with_capacity((N + 2) * SLICE);
+        for i in 0..(N + 2) * SLICE {
+            let (z, x, y) = (i / SLICE % N, i % SLICE / COLUMN % N, i % COLUMN % N);
+            values.push(f32::from(integers[(z * N + y) * N + x]) * scale);
+        }
         let mut solid = Self { integers, values, scale, projected_scale: 1.0 };
         solid.projected_scale = 1.0 / solid.projected_deviation();
         solid
@@ -50,14 +71,15 @@ impl Solid {
 
     #[inline]
     fn value(&self, x: i64, y: i64, z: i64) -> f32 {
-        self.values[(((z & MASK) * N as i64 + (y & MASK)) * N as i64 + (x & MASK)) as usize]
+        let [x, y, z] = [x, y, z].map(|v| v.rem_euclid(N as i64) as usize);
+        self.values[z * SLICE + x * COLUMN + y]
     }
 
     /// The noise at a point (x, y, z): of mean 0 and, over all points, variance 1.
     #[inline]
     pub fn at(&self, point: [f64; 3]) -> f32 {
         let axes = point.map(spline_weights);
-        let [x0, y0, z0] = axes.map(|(first, _)| around(first));
+        let [x0, y0, z0] = axes.map(|(first, _)| i64::from(wrapped(first, N)));
         let [wx, wy, wz] = axes.map(|(_, weights)| weights);
         let mut sum = 0.0;
         for (z, wz) in (z0..).zip(wz) {
@@ -69,6 +91,32 @@ impl Solid {
             sum += wz * slice;
         }
         sum
+    }
+
+    /// Adds `weight` times the noise at a block of points to `sums`: the same bits as [`Solid::at`] gives.
+    #[inline(always)]
+    pub fn add_block(&self, [xs, ys, zs]: &[Places; 3], weight: f32, sums: &mut [f32; BLOCK]) {
+        let mut noise = [0.0; BLOCK];
+        for (slice, wz) in zs.weights.iter().enumerate() {
+            // Along x, four places along y at a time, of which the last has no weight.
+            let mut columns = [[0.0; 4]; BLOCK];
+            let [w0, w1, w2] = &xs.weights;
+            for i in 0..BLOCK {
+                let column = (zs.first[i] as usize + slice) * SLICE + xs.first[i] as usize * COLUMN;
+                let at = column + ys.first[i] as usize;
+                let a = &self.values[at..][..4];
+                let b = &self.values[at + COLUMN..][..4];
+                let c = &self.values[at + 2 * COLUMN..][..4];
+                for k in 0..4 {
+                    columns[i][k] = (w0[i] * a[k] + w1[i] * b[k]) + w2[i] * c[k];
+                }
+            }
+            let [w0, w1, w2] = &ys.weights;
+            for (i, (noise, v)) in noise.iter_mut().zip(&columns).enumerate() {
+                *noise += wz[i] * (((0.0 + w0[i] * v[0]) + w1[i] * v[1]) + w2[i] * v[2]);
+            }
+        }
+        sums.iter_mut().zip(&noise).for_each(|(sum, noise)| *sum += weight * noise);
     }
 
     /// Standard deviation of the projected noise before it is scaled, over points and normals that are
@@ -117,11 +165,6 @@ impl Solid {
         }
         (sum * self.projected_scale) as f32
     }
-}
-
-#[inline]
-fn around(first: f64) -> i64 {
-    first.rem_euclid(N as f64) as i64
 }
 
 fn white_volume(stream: u32) -> Vec<f64> {
@@ -202,6 +245,19 @@ mod tests {
     }
 
     #[test]
+    fn a_block_has_the_same_bits_as_its_points() {
+        let solid = Solid::new(Detail::Round);
+        let point = |i: usize| [i as f64 * 0.37 - 1e9, 63.0 - i as f64, (i * i) as f64 * 0.71];
+        let mut places = [const { Places::NONE }; 3];
+        (0..3).for_each(|axis| places[axis].set(N, |i| point(i)[axis]));
+        let mut sums = [0.5; BLOCK];
+        solid.add_block(&places, 0.7, &mut sums);
+        for (i, &sum) in sums.iter().enumerate() {
+            assert_eq!(sum, 0.5 + 0.7 * solid.at(point(i)), "point {i}");
+        }
+    }
+
+    #[test]
     fn it_goes_round() {
         let solid = Solid::new(Detail::Round);
         for i in 0..50 {
@@ -209,5 +265,25 @@ mod tests {
             let moved = [point[0] + 64.0, point[1] - 128.0, point[2] + 6400.0];
             assert!((solid.at(point) - solid.at(moved)).abs() < 1e-4);
         }
+    }
+
+    #[test]
+    fn the_coefficients_never_change() {
+        // Documents made by older versions depend on them.
+        let sums = [Detail::Square, Detail::Round, Detail::RoundFine].map(|detail| {
+            let solid = Solid::new(detail);
+            let fold = |sum: u32, &v: &i16| hash(sum ^ u32::from(v as u16));
+            let at = solid.at([3.3, -7.1, 1e6 + 0.7]).to_bits();
+            let on = solid.projected([3.3, -7.1, 50.7], [0.6, 0.0, 0.8]).to_bits();
+            [solid.integers().iter().fold(0, fold), solid.scale().to_bits(), at, on]
+        });
+        assert_eq!(
+            sums,
+            [
+                [619_731_280, 977_272_868, 1_057_555_096, 3_173_336_399],
+                [2_481_073_840, 972_688_724, 1_038_719_816, 1_066_694_695],
+                [3_878_518_687, 981_350_170, 3_174_213_708, 1_054_669_596]
+            ]
+        );
     }
 }

@@ -1,6 +1,7 @@
 //! What power spectrum to expect of a photo of noise.
 
 use std::f64::consts::TAU;
+use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
@@ -14,30 +15,39 @@ use crate::signal::power::window;
 /// first `rows / 2 + 1` frequencies of y by the first `cols / 2 + 1` of x. Frequencies below zero have the
 /// same.
 pub fn expected(detail: Detail, levels: [u32; 2], (rows, cols): (usize, usize)) -> Vec<f64> {
-    let axes = [Axis::new(detail, levels[0], cols), Axis::new(detail, levels[1], rows)];
-    let mut power = unwindowed(detail, &axes);
-    let [across, down] = &axes;
-    power.par_chunks_mut(across.transfer.len()).for_each(|line| across.blur(line));
+    let (across, down) =
+        (Axis::new(detail, 0, levels[0], cols), Axis::new(detail, 1, levels[1], rows));
+    let (width, scale) = (across.transfer.len(), unit(detail, rows * cols));
+    let mut power = vec![0.0; width * down.transfer.len()];
+    power.par_chunks_mut(width).zip(&down.transfer).for_each(|(line, y)| {
+        unwindowed(detail, &across.transfer, y, scale, line);
+        across.blur(line);
+    });
     let mut columns = transposed(&power, across.transfer.len());
     columns.par_chunks_mut(down.transfer.len()).for_each(|line| down.blur(line));
     transposed(&columns, down.transfer.len())
 }
 
-/// The same before the window.
-fn unwindowed(detail: Detail, [across, down]: &[Axis; 2]) -> Vec<f64> {
-    let width = across.transfer.len();
-    let scale = 1.0 / (continuous(detail) * (down.n * across.n) as f64);
-    let mut power = vec![0.0; width * down.transfer.len()];
-    power.par_chunks_mut(width).zip(&down.transfer).for_each(|(line, &(fy, ty))| {
-        for (power, &(fx, tx)) in line.iter_mut().zip(&across.transfer) {
-            let transfer = tx * ty * scale;
-            // Where the spline leaves nothing the coefficients do not matter.
-            if transfer > 1e-7 * scale {
-                *power = transfer * detail.power([fx, fy]);
-            }
+/// The same at one frequency of y, before the window.
+fn unwindowed(
+    detail: Detail,
+    across: &[(Frequency, f64)],
+    (fy, ty): &(Frequency, f64),
+    scale: f64,
+    line: &mut [f64],
+) {
+    for (power, (fx, tx)) in line.iter_mut().zip(across) {
+        let transfer = tx * ty * scale;
+        // Where the spline leaves nothing the coefficients do not matter.
+        if transfer > 1e-7 * scale {
+            *power = transfer * detail.power([fx, fy]);
         }
-    });
-    power
+    }
+}
+
+/// What brings the noise to unit variance, for each frequency of a transform of so many pixels.
+fn unit(detail: Detail, pixels: usize) -> f64 {
+    1.0 / (continuous(detail) * pixels as f64)
 }
 
 fn transposed(plane: &[f64], width: usize) -> Vec<f64> {
@@ -56,7 +66,8 @@ struct Axis {
 }
 
 impl Axis {
-    fn new(detail: Detail, level: u32, n: usize) -> Self {
+    /// Of `n` pixels along an axis (0: x).
+    fn new(detail: Detail, axis: usize, level: u32, n: usize) -> Self {
         let spacing = 1usize << level;
         let cosine: Vec<f64> = (0..n).map(|k| libm::cos(TAU * k as f64 / n as f64)).collect();
         // The spline at pixels: symmetric, so its transform is a sum of cosines.
@@ -68,7 +79,7 @@ impl Axis {
                 let sum: f64 = sides.map(|(p, tap)| 2.0 * tap * cosine[p * k % n]).sum();
                 let f = k as f64 * spacing as f64 / n as f64;
                 (
-                    detail.frequency(f - f.round()),
+                    detail.frequency(axis, f - f.round()),
                     (taps[0] + sum) * (taps[0] + sum) / spacing as f64,
                 )
             })
@@ -113,14 +124,21 @@ fn moved(n: usize) -> Vec<f64> {
 
 /// Variance over all positions of the spline surface over coefficients of this detail.
 fn continuous(detail: Detail) -> f64 {
+    static KNOWN: [OnceLock<f64>; Detail::COUNT] = [const { OnceLock::new() }; Detail::COUNT];
+    *KNOWN[detail.index()].get_or_init(|| measured_continuous(detail))
+}
+
+fn measured_continuous(detail: Detail) -> f64 {
     const N: usize = 128;
     // The spline's products with itself, as a function of frequency.
     let products =
         |f: f64| (66.0 + 52.0 * libm::cos(TAU * f) + 2.0 * libm::cos(2.0 * TAU * f)) / 120.0;
     let at = |i: usize| (i as f64 + 0.5) / N as f64 - 0.5;
-    let axis: Vec<_> = (0..N).map(|i| (detail.frequency(at(i)), products(at(i)))).collect();
+    let axes = [0, 1].map(|axis| -> Vec<_> {
+        (0..N).map(|i| (detail.frequency(axis, at(i)), products(at(i)))).collect()
+    });
     let cell = |i: usize| {
-        let [(fx, px), (fy, py)] = [axis[i % N], axis[i / N]];
+        let [(fx, px), (fy, py)] = [&axes[0][i % N], &axes[1][i / N]];
         detail.power([fx, fy]) * px * py
     };
     (0..N * N).map(cell).sum::<f64>() / (N * N) as f64
@@ -132,13 +150,27 @@ pub const ALIKE: u32 = 2;
 /// Variance, at the photo's pixels, of noise that has unit variance over all positions: the finest bands
 /// are stronger at coefficients than between them.
 pub fn at_pixels(detail: Detail, levels: [u32; 2]) -> f64 {
+    const LEVELS: usize = ALIKE as usize + 1;
+    static KNOWN: [[[OnceLock<f64>; LEVELS]; LEVELS]; Detail::COUNT] =
+        [const { [const { [const { OnceLock::new() }; LEVELS] }; LEVELS] }; Detail::COUNT];
+    let [x, y] = levels.map(|level| level.min(ALIKE));
+    let known = &KNOWN[detail.index()][x as usize][y as usize];
+    *known.get_or_init(|| measured_at_pixels(detail, [x, y]))
+}
+
+/// On one thread: others may be waiting.
+fn measured_at_pixels(detail: Detail, levels: [u32; 2]) -> f64 {
     // So many coefficients tell all.
     const N: usize = 96;
-    let levels = levels.map(|level| level.min(ALIKE));
     let [cols, rows] = levels.map(|level| N << level);
-    let axes = [Axis::new(detail, levels[0], cols), Axis::new(detail, levels[1], rows)];
+    let (across, down) =
+        (Axis::new(detail, 0, levels[0], cols), Axis::new(detail, 1, levels[1], rows));
     // A part of the format: the analysis' window must not matter.
-    let power = unwindowed(detail, &axes);
+    let (width, scale) = (across.transfer.len(), unit(detail, rows * cols));
+    let mut power = vec![0.0; width * down.transfer.len()];
+    for (line, y) in power.chunks_exact_mut(width).zip(&down.transfer) {
+        unwindowed(detail, &across.transfer, y, scale, line);
+    }
     sum_both_signs(&power, (rows, cols), |_, _| true)
 }
 
@@ -209,7 +241,7 @@ fn sum_both_signs(
 
 #[cfg(test)]
 mod tests {
-    use super::super::Torus;
+    use super::super::{Torus, hash};
     use super::*;
     use crate::signal::power::power_spectrum;
 
@@ -250,5 +282,20 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn variances_at_pixels_never_change() {
+        // Documents made by older versions depend on them.
+        let mut sum = 0;
+        let parts = [Part::Low, Part::Band, Part::Fine];
+        let axes = (0..9).map(|i| Detail::Axes([parts[i % 3], parts[i / 3]]));
+        for detail in [Detail::Square, Detail::Round, Detail::RoundFine].into_iter().chain(axes) {
+            for levels in [[0, 0], [0, 1], [0, 2], [1, 0], [1, 1], [2, 2], [9, 2]] {
+                let bits = at_pixels(detail, levels).to_bits();
+                sum = hash(hash(sum ^ bits as u32) ^ (bits >> 32) as u32);
+            }
+        }
+        assert_eq!(sum, 873_516_221);
     }
 }

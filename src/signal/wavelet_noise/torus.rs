@@ -1,7 +1,11 @@
 //! [`Torus`]: wavelet noise on the plane.
 
 use super::filters::hold;
-use super::{Detail, SPLINE_PRODUCTS, fourier, quantised, spline_weights, white};
+use std::sync::{Arc, OnceLock};
+
+use super::fourier::{Strength, filter};
+use super::places::{BEYOND, BLOCK, Places};
+use super::{Detail, SPLINE_PRODUCTS, quantised, spline_weights, white, wrapped};
 
 /// A torus of coefficients of wavelet noise on the plane, whose unit of length is one coefficient.
 #[derive(Debug, Clone, PartialEq)]
@@ -9,7 +13,8 @@ pub struct Torus {
     rows: usize,
     cols: usize,
     integers: Vec<i16>,
-    /// The integers, scaled.
+    /// The integers, scaled: the first two rows follow the last, and the first columns every row's last, so
+    /// that no neighbour lies beyond an end.
     values: Vec<f32>,
     scale: f32,
 }
@@ -43,38 +48,63 @@ impl Row {
         };
         // All of them at most, and two again so that three always follow each other.
         row.span = (most - least + 3.0).min((n + 2) as f64) as usize;
-        row.start = wrapped(least, n);
-        row.first = firsts.into_iter().map(|first| wrapped(first - least, n) as u32).collect();
+        row.start = wrapped(least, n) as usize;
+        row.first = firsts.into_iter().map(|first| wrapped(first - least, n)).collect();
         row
     }
-}
-
-/// A whole number on a torus of `n`, which may be far away.
-#[inline]
-fn wrapped(position: f64, n: usize) -> usize {
-    // Exact: whole numbers below 2^53, and larger ones are whole by themselves.
-    position.rem_euclid(n as f64) as usize % n
 }
 
 impl Torus {
     /// Side of the torus of textures that need not tile.
     pub const SIDE: usize = 256;
 
-    /// The coefficients of an even number of `rows` and of `cols` (at least 2 each).
+    /// The coefficients of textures that need not tile: [`Torus::SIDE`] rows and columns. Made once in a
+    /// process.
+    pub fn shared(detail: Detail) -> Arc<Self> {
+        static MADE: [OnceLock<Arc<Torus>>; Detail::COUNT] =
+            [const { OnceLock::new() }; Detail::COUNT];
+        let side = (Self::SIDE, Self::SIDE);
+        MADE[detail.index()].get_or_init(|| Arc::new(Self::new(side, detail))).clone()
+    }
+
+    /// The coefficients of an even number of `rows` and of `cols` (at least 2 each), drawn once and for
+    /// all.
     pub fn new((rows, cols): (usize, usize), detail: Detail) -> Self {
-        assert!(rows >= 2 && cols >= 2 && rows % 2 == 0 && cols % 2 == 0, "{rows}x{cols}");
         let coefficients = if detail == Detail::Square {
             square((rows, cols))
         } else {
             let mut plane = white_plane((rows, cols), 2);
-            fourier::filter(&mut plane, [rows, cols], |[fy, fx]| {
-                detail.amplitude([fx, fy]).unwrap_or(1.0)
+            let (x, y) = (detail.frequencies(0, cols), detail.frequencies(1, rows));
+            filter(&mut plane, [rows, cols], Strength::Kept, |[down, across]| {
+                detail.amplitude([&x[across], &y[down]]).unwrap_or(1.0)
             });
             plane
         };
+        Self::of(&coefficients, (rows, cols))
+    }
+
+    /// Others, drawn from a stream of random numbers, in which all waves are as strong as they are in noise
+    /// on average; the mean is nothing. Where only a few waves go round, drawn strengths would leave
+    /// stripes by chance.
+    pub fn even((rows, cols): (usize, usize), detail: Detail, stream: u32) -> Self {
+        let mut plane = white_plane((rows, cols), stream);
+        let (x, y) = (detail.frequencies(0, cols), detail.frequencies(1, rows));
+        filter(&mut plane, [rows, cols], Strength::Even, |[down, across]| {
+            let mean = down + across == 0;
+            if mean { 0.0 } else { detail.power([&x[across], &y[down]]).max(0.0).sqrt() }
+        });
+        Self::of(&plane, (rows, cols))
+    }
+
+    /// Of these coefficients.
+    fn of(coefficients: &[f64], (rows, cols): (usize, usize)) -> Self {
+        assert!(rows >= 2 && cols >= 2 && rows % 2 == 0 && cols % 2 == 0, "{rows}x{cols}");
         let (integers, scale) =
-            quantised(&coefficients, |integers| variance(integers, (rows, cols)));
-        let values = integers.iter().map(|&v| f32::from(v) * scale).collect();
+            quantised(coefficients, |integers| variance(integers, (rows, cols)));
+        let mut values = Vec::with_capacity((rows + 2) * (cols + BEYOND));
+        for row in integers.chunks_exact(cols).cycle().take(rows + 2) {
+            values.extend(row.iter().cycle().take(cols + BEYOND).map(|&v| f32::from(v) * scale));
+        }
         Self { rows, cols, integers, values, scale }
     }
 
@@ -98,19 +128,40 @@ impl Torus {
     pub fn at(&self, x: f64, y: f64) -> f32 {
         let (left, wx) = spline_weights(x);
         let (top, wy) = spline_weights(y);
-        let next = |i: usize, n: usize| if i + 1 == n { 0 } else { i + 1 };
-        let y0 = wrapped(top, self.rows);
-        let y1 = next(y0, self.rows);
-        let rows = [y0, y1, next(y1, self.rows)].map(|y| y * self.cols);
-        let mut x = wrapped(left, self.cols);
-        let mut sum = 0.0;
-        for (k, wx) in wx.into_iter().enumerate() {
-            let [a, b, c] = rows.map(|row| self.values[row + x]);
-            let value = wx * ((wy[0] * a + wy[1] * b) + wy[2] * c);
-            sum = if k == 0 { value } else { sum + value };
-            x = next(x, self.cols);
+        let (x, y) = (wrapped(left, self.cols) as usize, wrapped(top, self.rows) as usize);
+        let [v0, v1, v2] = [0, 1, 2].map(|k| {
+            let [a, b, c] = [0, 1, 2].map(|j| self.row(y + j)[x + k]);
+            wx[k] * ((wy[0] * a + wy[1] * b) + wy[2] * c)
+        });
+        (v0 + v1) + v2
+    }
+
+    /// A row of values and those beyond its end.
+    fn row(&self, y: usize) -> &[f32] {
+        let stride = self.cols + BEYOND;
+        &self.values[y * stride..][..stride]
+    }
+
+    /// Adds `weight` times the noise at a block of points to `sums`: the same bits as [`Torus::at`] gives.
+    #[inline(always)]
+    pub fn add_block(&self, [xs, ys]: &[Places; 2], weight: f32, sums: &mut [f32; BLOCK]) {
+        let stride = self.cols + BEYOND;
+        // Along y, four columns at a time, of which the last has no weight.
+        let mut columns = [[0.0; 4]; BLOCK];
+        let [w0, w1, w2] = &ys.weights;
+        for i in 0..BLOCK {
+            let at = ys.first[i] as usize * stride + xs.first[i] as usize;
+            let a = &self.values[at..][..4];
+            let b = &self.values[at + stride..][..4];
+            let c = &self.values[at + 2 * stride..][..4];
+            for k in 0..4 {
+                columns[i][k] = (w0[i] * a[k] + w1[i] * b[k]) + w2[i] * c[k];
+            }
         }
-        sum
+        let [w0, w1, w2] = &xs.weights;
+        for (i, (sum, v)) in sums.iter_mut().zip(&columns).enumerate() {
+            *sum += weight * ((w0[i] * v[0] + w1[i] * v[1]) + w2[i] * v[2]);
+        }
     }
 
     /// Adds `weight` times the noise at the positions of `xs` and height `y` to `sums`: the same bits as
@@ -124,10 +175,8 @@ impl Torus {
         sums: &mut [f32],
     ) {
         let (top, wy) = spline_weights(y);
-        let rows: [&[f32]; 3] = std::array::from_fn(|k| {
-            let row = (wrapped(top, self.rows) + k) % self.rows;
-            &self.values[row * self.cols..][..self.cols]
-        });
+        let top = wrapped(top, self.rows) as usize;
+        let rows = [0, 1, 2].map(|k| &self.row(top + k)[..self.cols]);
         combined.clear();
         let mut at = xs.start;
         while combined.len() < xs.span {
@@ -186,20 +235,22 @@ fn held(plane: &[f64], cols: usize, along_x: bool) -> Vec<f64> {
 
 /// Variance of the spline surface over these coefficients, averaged over all positions: sums of integers.
 fn variance(integers: &[i16], (rows, cols): (usize, usize)) -> f64 {
-    let around = |i: usize, by: usize, n: usize| (i + n * 2 + by - 2) % n;
+    let around = |i: usize, n: usize| (i + n * 2 - 2) % n;
+    // Filtered by the spline's products with itself, along x and then y: 120^2 * 2^15 is below 2^31.
+    let products = SPLINE_PRODUCTS.map(|p| p as i32);
+    let sum = |v: [i32; 5]| (0..5).map(|k| products[k] * v[k]).sum::<i32>();
+    let mut across = Vec::with_capacity(integers.len());
+    for row in integers.chunks_exact(cols) {
+        let longer: Vec<i32> = (0..cols + 4).map(|x| i32::from(row[around(x, cols)])).collect();
+        across.extend((0..cols).map(|x| sum(std::array::from_fn(|k| longer[x + k]))));
+    }
     let mut total = 0i128;
-    for (dy, py) in SPLINE_PRODUCTS.into_iter().enumerate() {
-        for (dx, px) in SPLINE_PRODUCTS.into_iter().enumerate() {
-            let mut products = 0i64;
-            for y in 0..rows {
-                let row = &integers[y * cols..][..cols];
-                let other = &integers[around(y, dy, rows) * cols..][..cols];
-                for x in 0..cols {
-                    products += i64::from(row[x]) * i64::from(other[around(x, dx, cols)]);
-                }
-            }
-            total += i128::from(products) * i128::from(py * px);
-        }
+    for (y, row) in integers.chunks_exact(cols).enumerate() {
+        let lines: [&[i32]; 5] =
+            std::array::from_fn(|k| &across[around(y + k, rows) * cols..][..cols]);
+        let filtered = |x: usize| i64::from(sum(lines.map(|line| line[x])));
+        let products = row.iter().enumerate().map(|(x, &v)| i64::from(v) * filtered(x));
+        total += i128::from(products.sum::<i64>());
     }
     let mean = integers.iter().map(|&v| i64::from(v)).sum::<i64>() as f64 / integers.len() as f64;
     total as f64 / (120.0 * 120.0 * integers.len() as f64) - mean * mean
@@ -252,6 +303,41 @@ mod tests {
     }
 
     #[test]
+    fn a_block_has_the_same_bits_as_its_points() {
+        let torus = Torus::new((16, 64), Detail::Square);
+        let x = |i: usize| i as f64 * 0.37 - 2e9;
+        let y = |i: usize| 15.0 - (i * i) as f64 * 0.25;
+        let mut places = [const { Places::NONE }; 2];
+        places[0].set(64, x);
+        places[1].set(16, y);
+        let mut sums = [0.5; BLOCK];
+        torus.add_block(&places, 0.7, &mut sums);
+        for (i, &sum) in sums.iter().enumerate() {
+            assert_eq!(sum, 0.5 + 0.7 * torus.at(x(i), y(i)), "point {i}");
+        }
+    }
+
+    #[test]
+    fn even_strengths_leave_no_direction() {
+        for detail in [Detail::Square, Detail::Round] {
+            let torus = Torus::even((4, 4), detail, 5);
+            let c: Vec<f64> = torus.integers().iter().map(|&v| f64::from(v)).collect();
+            // One wave round: the coefficients against its cosine and sine.
+            let power = |stride: usize| {
+                let part = |phase: usize| {
+                    let sign = |i: usize| [1.0, 0.0, -1.0, 0.0][(i / stride + phase) % 4];
+                    (0..16).map(|i| c[i] * sign(i)).sum::<f64>()
+                };
+                part(0).powi(2) + part(1).powi(2)
+            };
+            let (across, down) = (power(1), power(4));
+            assert!((across / down - 1.0).abs() < 1e-2, "{detail:?}: {across} {down}");
+            assert!(c.iter().sum::<f64>().abs() <= 8.0);
+            assert_ne!(torus, Torus::even((4, 4), detail, 6));
+        }
+    }
+
+    #[test]
     fn it_goes_round() {
         let torus = Torus::new((6, 10), Detail::Square);
         for (x, y) in positions(12, 0.7) {
@@ -287,5 +373,13 @@ mod tests {
                 .fold(0u32, |sum, &v| super::super::hash(sum ^ v as u16 as u32))
         });
         assert_eq!(sums, [2_869_209_762, 2_483_746_438, 2_215_425_495, 434_750_818]);
+        let values = [Detail::Square, Detail::Round, Detail::RoundFine, upright].map(|detail| {
+            let torus = Torus::new(side, detail);
+            (0..1000).fold(torus.scale().to_bits(), |sum, i| {
+                let value = torus.at(f64::from(i) * 3.7 - 2e3, f64::from(i * i) * 0.71);
+                super::super::hash(sum ^ value.to_bits())
+            })
+        });
+        assert_eq!(values, [1_270_492_417, 1_488_887_137, 2_748_157_639, 861_491_236]);
     }
 }
