@@ -1,7 +1,9 @@
 //! GLSL: functions to include or paste, and a shader that shows them.
 
-use super::shader::{Language, Output, about_tile, heading, outputs};
-use super::tile::tile_picture;
+use super::shader::{
+    Language, Output, about_pictures, heading, outputs, pictures, pictures_in_example,
+};
+use super::tiling::Reading;
 use super::{ExportFile, Program};
 use crate::base::error::Result;
 
@@ -21,26 +23,44 @@ const GLSL: Language = Language {
 ",
     handed: "tile, layer",
     chosen: |tile| format!("tile, {tile}"),
+    reading: Reading {
+        table: ("sampler2D", "table"),
+        picture: "sampler2D",
+        sampler: None,
+        above: "const bool NAME_flipped = false; // true where pictures are loaded bottom row first\n\n",
+        vertex: "    \
+    int line = j & 31;
+    if (NAME_flipped) { line = 31 - line; }
+    return floor(texelFetch(table, ivec2((i & 31) + 32 * side, line), 0).rgb * 255.0 + 0.5);
+",
+        sample: "    \
+    vec2 at = vec2(x / WIDTH, y / HEIGHT);
+    if (NAME_flipped) { at.y = 1.0 - at.y; }
+    return (textureLod(picture, at, level).rgb * 65535.0 - 32768.0) / 8192.0;
+",
+    },
 };
 
 /// `NAME.glsl`, `NAME_example.frag` and the picture of coefficients.
 pub(super) fn glsl(name: &str, program: &Program, es: bool) -> Result<Vec<ExportFile>> {
-    let functions = heading(name, program, &about_tile(name, program))
-        + &GLSL.texture(name, program, ("sampler2D", "tile"));
+    let functions =
+        heading(name, program, &about_pictures(name, program)) + &GLSL.texture(name, program);
     let version = if es {
         "#version 300 es\nprecision highp float;\nprecision highp int;\nprecision highp sampler2D;\n"
     } else {
         "#version 330\n"
     };
-    let example = format!("{version}{functions}{}", example(name, &outputs(program)));
-    Ok(vec![
+    let example = format!("{version}{functions}{}", example(name, program));
+    let mut files = vec![
         ExportFile { name: format!("{name}.glsl"), bytes: functions.into_bytes() },
         ExportFile { name: format!("{name}_example.frag"), bytes: example.into_bytes() },
-        tile_picture(name, program)?,
-    ])
+    ];
+    files.extend(pictures(name, program)?);
+    Ok(files)
 }
 
-fn example(name: &str, outputs: &[Output]) -> String {
+fn example(name: &str, program: &Program) -> String {
+    let outputs = &outputs(program)[..];
     let returned = GLSL.returned(name, outputs);
     let (uniform, shown) = if let [one] = outputs {
         (String::new(), format!("    color = {};\n", GLSL.shown(one, "texture_here")))
@@ -55,11 +75,14 @@ fn example(name: &str, outputs: &[Output]) -> String {
             format!("    color = vec4(0.0);\n{lines}"),
         )
     };
+    let given = pictures_in_example(name, program);
+    let sampler = |p: &String| format!("uniform sampler2D {p};\n");
+    let samplers: String = given.iter().map(sampler).collect();
+    let given = given.join(", ");
     format!(
         "
 // An example: the texture over the whole window.
-uniform sampler2D {name}_tile;
-uniform vec2 origin; // of the window, in pixels of the photo
+{samplers}uniform vec2 origin; // of the window, in pixels of the photo
 uniform float scale; // pixels of the photo to a pixel of the window
 uniform float contrast;
 uniform bool linear_light;
@@ -68,7 +91,7 @@ uniform bool linear_light;
 void main() {{
     vec2 p = origin + scale * gl_FragCoord.xy;
     float footprint = max(length(dFdx(p)), length(dFdy(p)));
-    {returned} texture_here = {name}({name}_tile, p, footprint, contrast, linear_light);
+    {returned} texture_here = {name}({given}, p, footprint, contrast, linear_light);
 {shown}}}
 "
     )

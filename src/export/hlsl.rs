@@ -1,7 +1,11 @@
 //! HLSL: functions to include, and a shader that shows them.
 
-use super::shader::{Language, Output, about_tile, heading, outputs};
-use super::tile::tile_picture;
+use std::fmt::Write as _;
+
+use super::shader::{
+    Language, Output, about_pictures, heading, outputs, pictures, pictures_in_example,
+};
+use super::tiling::Reading;
 use super::{ExportFile, Program};
 use crate::base::error::Result;
 
@@ -25,21 +29,39 @@ const HLSL: Language = Language {
 ",
     handed: "tile, layer",
     chosen: |tile| format!("tile, {tile}"),
+    reading: Reading {
+        table: ("Texture2D<float4>", "table"),
+        picture: "Texture2D<float4>",
+        sampler: Some(("SamplerState", "filtering")),
+        above: "static const bool NAME_flipped = false; // true where pictures are loaded bottom row first, as in Unity\n\n",
+        vertex: "    \
+    int row_of_table = j & 31;
+    if (NAME_flipped) { row_of_table = 31 - row_of_table; }
+    return floor(table.Load(int3((i & 31) + 32 * side, row_of_table, 0)).rgb * 255.0 + 0.5);
+",
+        sample: "    \
+    float2 at = float2(x / WIDTH, y / HEIGHT);
+    if (NAME_flipped) { at.y = 1.0 - at.y; }
+    return (picture.SampleLevel(filtering, at, level).rgb * 65535.0 - 32768.0) / 8192.0;
+",
+    },
 };
 
 /// `NAME.hlsl`, `NAME_example.hlsl` and the picture of coefficients.
 pub(super) fn hlsl(name: &str, program: &Program) -> Result<Vec<ExportFile>> {
-    let functions = heading(name, program, &about_tile(name, program))
-        + &HLSL.texture(name, program, ("Texture2D<float4>", "tile"));
-    let example = format!("{functions}{}", example(name, &outputs(program)));
-    Ok(vec![
+    let functions =
+        heading(name, program, &about_pictures(name, program)) + &HLSL.texture(name, program);
+    let example = format!("{functions}{}", example(name, program));
+    let mut files = vec![
         ExportFile { name: format!("{name}.hlsl"), bytes: functions.into_bytes() },
         ExportFile { name: format!("{name}_example.hlsl"), bytes: example.into_bytes() },
-        tile_picture(name, program)?,
-    ])
+    ];
+    files.extend(pictures(name, program)?);
+    Ok(files)
 }
 
-fn example(name: &str, outputs: &[Output]) -> String {
+fn example(name: &str, program: &Program) -> String {
+    let outputs = &outputs(program)[..];
     let returned = HLSL.returned(name, outputs);
     let (uniform, shown) = if let [one] = outputs {
         (String::new(), format!("    return {};\n", HLSL.shown(one, "texture_here")))
@@ -53,11 +75,22 @@ fn example(name: &str, outputs: &[Output]) -> String {
             format!("    float4 color = float4(0.0, 0.0, 0.0, 0.0);\n{lines}    return color;\n");
         ("int shown; // which of the maps\n".into(), shown)
     };
+    let mut given = pictures_in_example(name, program);
+    let texture = |p: &String| format!("Texture2D<float4> {p};\n");
+    let mut textures: String = given.iter().map(texture).collect();
+    if program.tiling.is_some() {
+        let filtering = format!("{name}_filtering");
+        let _ = writeln!(
+            textures,
+            "SamplerState {filtering}; // linear, also between mipmaps, clamped"
+        );
+        given.push(filtering);
+    }
+    let given = given.join(", ");
     format!(
         "
 // An example: the texture over the whole window.
-Texture2D<float4> {name}_tile;
-float2 origin; // of the window, in pixels of the photo
+{textures}float2 origin; // of the window, in pixels of the photo
 float scale; // pixels of the photo to a pixel of the window
 float contrast;
 bool linear_light;
@@ -65,7 +98,7 @@ bool linear_light;
 float4 example(float4 at : SV_Position) : SV_Target {{
     float2 p = origin + scale * at.xy;
     float footprint = max(length(ddx(p)), length(ddy(p)));
-    {returned} texture_here = {name}({name}_tile, p, footprint, contrast, linear_light);
+    {returned} texture_here = {name}({given}, p, footprint, contrast, linear_light);
 {shown}}}
 "
     )

@@ -12,6 +12,7 @@ mod osl;
 mod program;
 mod shader;
 mod tile;
+mod tiling;
 mod wgsl;
 
 use crate::base::error::{Error, Result};
@@ -58,8 +59,8 @@ pub struct ExportFile {
 pub fn export(texture_name: &str, program: &Program, target: Target) -> Result<Vec<ExportFile>> {
     let name = &names::identifier(texture_name, "texture");
     let plain = &names::plain(texture_name, "texture");
-    if program.tiling.is_some() {
-        let expected = "a target that can tile and blend, of which there is none yet";
+    if program.tiling.is_some() && matches!(target, Target::Materialx | Target::Blender) {
+        let expected = "glsl, glsl-es, wgsl, hlsl or osl for a texture that is tiled and blended";
         return Err(Error::parameter("target", expected, target.show()));
     }
     match target {
@@ -67,7 +68,7 @@ pub fn export(texture_name: &str, program: &Program, target: Target) -> Result<V
         Target::GlslEs => glsl::glsl(name, program, true),
         Target::Wgsl => wgsl::wgsl(name, program),
         Target::Hlsl => hlsl::hlsl(name, program),
-        Target::Osl => Ok(osl::osl(name, program)),
+        Target::Osl => osl::osl(name, program),
         Target::Materialx => materialx::materialx(program, plain),
         Target::Blender => Ok(blender::blender(program, plain)),
     }

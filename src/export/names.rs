@@ -137,6 +137,7 @@ const TAKEN: &[&str] = &[
     "y",
     "pow",
     "log",
+    "log2",
     "exp",
     "ceil",
     "clamp",

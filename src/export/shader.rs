@@ -2,9 +2,13 @@
 
 use std::fmt::Write as _;
 
-use super::Program;
 use super::names::{fields, identifier};
+use super::tile::tile_picture;
+use super::tiling::{Reading, about_table_and_input, picture_names, table_and_input};
+use super::{ExportFile, Program, ProgramChannel};
+use crate::base::error::Result;
 use crate::method::noise::KNOTS;
+use crate::method::noise::tiling::SIDE;
 use crate::signal::wavelet_noise::Torus;
 
 /// The words of a language.
@@ -26,6 +30,8 @@ pub(super) struct Language {
     pub(super) handed: &'static str,
     /// The same from the texture's function, which knows the number of the tile.
     pub(super) chosen: fn(usize) -> String,
+    /// How the pictures of a tiled texture are read.
+    pub(super) reading: Reading,
 }
 
 /// A fraction as text that every language reads back to the same bits.
@@ -63,8 +69,8 @@ impl Language {
         format!("    {word} {name} = 0.0;\n")
     }
 
-    /// The functions that the texture's own function calls.
-    pub(super) fn helpers(&self, name: &str, program: &Program) -> String {
+    /// The functions that give the surface over coefficients.
+    fn noise_helpers(&self, name: &str) -> String {
         let (float, int) = (self.float, self.int);
         let mut out = String::new();
         let tile = self.tile;
@@ -112,7 +118,16 @@ impl Language {
             row(1),
             row(2)
         );
+        out
+    }
 
+    /// The functions that the texture's own function calls.
+    pub(super) fn helpers(&self, name: &str, program: &Program) -> String {
+        let float = self.float;
+        let mut out = match &program.tiling {
+            Some(tiling) => self.tiled_helpers(name, tiling),
+            None => self.noise_helpers(name),
+        };
         out += "// The share of a band that samples so many pixels apart can hold.\n";
         let band = [(float, "level"), (float, "footprint")];
         out += &self.head(float, &format!("{name}_kept"), &band);
@@ -173,9 +188,8 @@ impl Language {
         out
     }
 
-    /// Lines that make the outputs `v0`, `v1`, ... of `x` and `y`, in pixels of the photo, and of
-    /// `footprint`, `contrast` and `linear_light`.
-    pub(super) fn body(&self, name: &str, program: &Program) -> String {
+    /// Lines that make the independent channels `c0`, `c1`, ... of `x`, `y` and `footprint`.
+    fn noise_channels(&self, name: &str, program: &Program) -> String {
         let float = self.float;
         let mut out = String::new();
         let turned = |axis: &str| {
@@ -235,14 +249,30 @@ impl Language {
                     let _ = writeln!(out, "    lost{c} += {share} * (1.0 - k{l} * k{l});");
                 }
             }
-            if channel.shape.is_some() {
-                let per = number(channel.per_deviation);
-                let shaped = format!("{name}_channel_{c}(n{c} * {per}, sqrt(lost{c}))");
-                out += &self.value(float, &format!("c{c}"), &shaped);
-            } else {
-                out += &self.value(float, &format!("c{c}"), &format!("n{c}"));
-            }
+            out += &self.channel(name, c, channel);
         }
+        out
+    }
+
+    /// A line that makes channel `c` of its noise and, if it has a histogram, of what of it is lost.
+    pub(super) fn channel(&self, name: &str, c: usize, channel: &ProgramChannel) -> String {
+        let value = if channel.shape.is_some() {
+            let per = number(channel.per_deviation);
+            format!("{name}_channel_{c}(n{c} * {per}, sqrt(lost{c}))")
+        } else {
+            format!("n{c}")
+        };
+        self.value(self.float, &format!("c{c}"), &value)
+    }
+
+    /// Lines that make the outputs `v0`, `v1`, ... of `x` and `y`, in pixels of the photo, and of
+    /// `footprint`, `contrast` and `linear_light`.
+    pub(super) fn body(&self, name: &str, program: &Program) -> String {
+        let float = self.float;
+        let mut out = match &program.tiling {
+            Some(tiling) => self.tiled_channels(name, program, tiling),
+            None => self.noise_channels(name, program),
+        };
         out += "    // Mean, and what each channel adds.\n";
         for (i, (mean, row)) in program.mean.iter().zip(&program.matrix).enumerate() {
             let sum: Vec<_> =
@@ -309,7 +339,8 @@ impl Language {
     }
 
     /// The whole texture: helpers, and the function `name(tile, p, footprint, contrast, linear_light)`.
-    pub(super) fn texture(&self, name: &str, program: &Program, sampler: (&str, &str)) -> String {
+    /// That of a tiled texture takes its table and its input in place of the tile.
+    pub(super) fn texture(&self, name: &str, program: &Program) -> String {
         let (float, bool) = (self.float, self.bool);
         let outputs = outputs(program);
         let returned = self.returned(name, &outputs);
@@ -328,13 +359,17 @@ impl Language {
             out += if self.name_first { "}\n\n" } else { "};\n\n" };
         }
         out += TEXTURE;
-        let parameters = [
-            sampler,
+        let pictures = match &program.tiling {
+            Some(tiling) => self.tiled_parameters(tiling),
+            None => vec![(self.tile[0].0, self.tile[0].1.to_owned())],
+        };
+        let mut parameters: Vec<_> = pictures.iter().map(|(ty, n)| (*ty, n.as_str())).collect();
+        parameters.extend([
             (self.vectors[0], "p"),
             (float, "footprint"),
             (float, "contrast"),
             (bool, "linear_light"),
-        ];
+        ]);
         out += &self.head(&returned, name, &parameters);
         out += &self.value(float, "x", "p.x");
         out += &self.value(float, "y", "p.y");
@@ -399,29 +434,56 @@ const TEXTURE: &str = "\
 ";
 
 /// Comments at the top of a file.
-pub(super) fn heading(name: &str, program: &Program, tile: &str) -> String {
+pub(super) fn heading(name: &str, program: &Program, pictures: &str) -> String {
     let [width, height] = program.size;
-    let period = Torus::SIDE << program.terms.iter().flat_map(|t| t.levels).max().unwrap_or(0);
+    let period = if let Some(tiling) = &program.tiling {
+        // Two rows lie as far right as the next column but one.
+        let [across, down] = tiling.layout.cell.map(|n| n as usize * SIDE);
+        format!("{across} x {} pixels", 2 * down)
+    } else {
+        let coarsest = program.terms.iter().flat_map(|t| t.levels).max().unwrap_or(0);
+        format!("{} pixels", Torus::SIDE << coarsest)
+    };
     let again = if program.turn.is_some() {
         String::new()
     } else {
-        format!(
-            "// All repeats after {period} pixels: where coordinates grow large, wrap them there.\n"
-        )
+        format!("// All repeats after {period}: where coordinates grow large, wrap them there.\n")
     };
     format!(
         "// {name}: a procedural texture, written by texforge from a photo of {width} x {height} pixels.\n\
          // It has no end; coordinates are in pixels of that photo. A float keeps them to 1/4000 of a pixel\n\
          // within 4096 pixels of the origin, to 1/16 within a million.\n\
-         {again}{tile}\n"
+         {again}{pictures}\n"
     )
 }
 
-/// Comments about the picture of coefficients.
-pub(super) fn about_tile(name: &str, program: &Program) -> String {
+/// Comments about the pictures that a texture needs.
+pub(super) fn about_pictures(name: &str, program: &Program) -> String {
+    if let Some(tiling) = &program.tiling {
+        return about_table_and_input(name, tiling);
+    }
     let (side, height) = (Torus::SIDE, Torus::SIDE * program.tiles.len());
     format!(
         "// {name}_tile.png ({side} x {height}) holds its coefficients: red is the high byte, green the low one.\n\
          // Load it as it is: 8 bits, not sRGB, not compressed, no mipmaps, top row first (or set flipped).\n"
     )
+}
+
+/// The pictures that a texture needs.
+pub(super) fn pictures(name: &str, program: &Program) -> Result<Vec<ExportFile>> {
+    match &program.tiling {
+        Some(tiling) => table_and_input(name, tiling),
+        None => Ok(vec![tile_picture(name, program)?]),
+    }
+}
+
+/// What the pictures are called in the examples: as their files, in the order of the function's parameters.
+pub(super) fn pictures_in_example(name: &str, program: &Program) -> Vec<String> {
+    match &program.tiling {
+        Some(tiling) => {
+            let input = picture_names(name, "input", tiling);
+            std::iter::once(format!("{name}_table")).chain(input).collect()
+        }
+        None => vec![format!("{name}_tile")],
+    }
 }

@@ -7,11 +7,14 @@ Every picture is float32, height x width x 4; its pixel `[y, x]` is what the sha
 from .gl import compile_glsl, render_glsl
 from .hlsl import compile_hlsl, render_hlsl
 from .materialx import generate_glsl, generate_text, render_materialx, validate_materialx
-from .tools import ShaderError
+from .tools import Filtered, Picture, ShaderError, Texture
 from .webgpu import compile_wgsl, render_wgsl
 
 __all__ = [
+    "Filtered",
+    "Picture",
     "ShaderError",
+    "Texture",
     "compile_glsl",
     "compile_hlsl",
     "compile_wgsl",

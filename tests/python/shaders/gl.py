@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import moderngl
 import numpy as np
 
-from .tools import Picture, ShaderError, Texture, Uniform, channels, missing, run
+from .tools import Filtered, Picture, ShaderError, Texture, Uniform, channels, missing, run
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -33,13 +33,14 @@ def compile_glsl(source: str, stage: str = "frag") -> None:
 def render_glsl(
     source: str,
     size: tuple[int, int],
-    textures: Mapping[str, Texture] | None = None,
+    textures: Mapping[str, Texture | Filtered] | None = None,
     uniforms: Mapping[str, Uniform] | None = None,
 ) -> Picture:
     """Run a fragment shader on a picture of `size`, which is height and width.
 
     A `sampler2D` reads integers as fractions of the greatest, a `usampler2D` as they are. The
-    first row of a texture has the coordinate 0; the nearest texel is taken, repeated outside.
+    first row of a texture has the coordinate 0; the nearest texel is taken, repeated outside, but
+    of `Filtered` ones.
     """
     with context() as gl:
         program = link(f"{_version(source)}\n{WHOLE_PICTURE}", source)
@@ -83,8 +84,9 @@ def uniform(program: Any, name: str) -> Any:
     return found[0]
 
 
-def bind(program: Any, name: str, texture: Texture, unit: int) -> Any:
+def bind(program: Any, name: str, given: Texture | Filtered, unit: int) -> Any:
     """Upload a texture and let the sampler of that name read it; return it."""
+    texture = given.texture if isinstance(given, Filtered) else given
     sampler = uniform(program, name)
     bits = 8 * texture.dtype.itemsize
     if texture.dtype.kind == "f":
@@ -98,6 +100,10 @@ def bind(program: Any, name: str, texture: Texture, unit: int) -> Any:
         (width, height), channels(texture), texture.tobytes(), alignment=1, dtype=dtype
     )
     made.filter = (moderngl.NEAREST, moderngl.NEAREST)
+    if isinstance(given, Filtered):
+        made.build_mipmaps()
+        made.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+        made.repeat_x = made.repeat_y = False
     made.use(unit)
     sampler.value = unit
     return made

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .gl import render_glsl
-from .tools import Picture, Texture, Uniform, run
+from .tools import Filtered, Picture, Texture, Uniform, run
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -35,7 +35,7 @@ def render_hlsl(
     source: str,
     entry: str,
     size: tuple[int, int],
-    textures: Mapping[str, Texture] | None = None,
+    textures: Mapping[str, Texture | Filtered] | None = None,
     uniforms: Mapping[str, Uniform] | None = None,
 ) -> Picture:
     """Run a pixel shader, as `render_glsl` does."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
-from typing import TYPE_CHECKING, NoReturn, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple, NoReturn, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +18,12 @@ Picture: TypeAlias = npt.NDArray[np.float32]
 Texture: TypeAlias = npt.NDArray[np.generic]
 """Height x width, or height x width x 1, 2 or 4 (OpenGL: 3 too), of uint8, uint16 or float32."""
 Uniform: TypeAlias = float | tuple[float, ...] | npt.NDArray[np.generic]
+
+
+class Filtered(NamedTuple):
+    """A texture with mipmaps that is read in between, and whose border goes on outside."""
+
+    texture: Texture
 
 
 class ShaderError(Exception):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import wgpu
 
-from .tools import Picture, ShaderError, Texture, Uniform, channels, missing
+from .tools import Filtered, Picture, ShaderError, Texture, Uniform, channels, missing
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -41,13 +41,14 @@ def render_wgsl(
     source: str,
     entry: str,
     size: tuple[int, int],
-    textures: Mapping[str, Texture] | None = None,
+    textures: Mapping[str, Texture | Filtered] | None = None,
     uniforms: Mapping[str, Uniform] | None = None,
 ) -> Picture:
     """Run a fragment shader on a picture of `size`, which is height and width.
 
     A `texture_2d<f32>` reads integers as fractions of the greatest, a `texture_2d<u32>` as they
     are. Uniforms and storage buffers that are no scalars or vectors are given as their bytes lie.
+    A `sampler` is linear, also between levels, and goes on with the border.
     """
     device = _device()
     height, width = size
@@ -96,7 +97,7 @@ def _device() -> Any:
 
 
 def _resources(
-    source: str, textures: Mapping[str, Texture], uniforms: Mapping[str, Uniform]
+    source: str, textures: Mapping[str, Texture | Filtered], uniforms: Mapping[str, Uniform]
 ) -> dict[int, list[dict[str, Any]]]:
     """Return what to bind, by group."""
     found = {m[4]: m for m in BINDING.finditer(source)}
@@ -112,11 +113,18 @@ def _resources(
         groups[int(found[name][1])].append(
             {"binding": int(found[name][2]), "resource": {"buffer": buffer}}
         )
+    for binding in found.values():
+        if binding[5].strip() == "sampler":
+            linear = dict.fromkeys(["mag_filter", "min_filter", "mipmap_filter"], "linear")
+            resource = _device().create_sampler(**linear)
+            groups[int(binding[1])].append({"binding": int(binding[2]), "resource": resource})
     return groups
 
 
-def _texture(texture: Texture, *, integers: bool) -> Any:
+def _texture(given: Texture | Filtered, *, integers: bool) -> Any:
     """Upload a texture and return a view of it."""
+    levels = _halves(given.texture) if isinstance(given, Filtered) else [given]
+    texture = levels[0]
     bits = 8 * texture.dtype.itemsize
     kind = "float" if texture.dtype.kind == "f" else "uint" if integers else "unorm"
     height, width = texture.shape[:2]
@@ -125,14 +133,26 @@ def _texture(texture: Texture, *, integers: bool) -> Any:
         size=(width, height, 1),
         format=f"{'rgba'[:depth]}{bits}{kind}",
         usage=wgpu.TextureUsage.TEXTURE_BINDING | wgpu.TextureUsage.COPY_DST,
+        mip_level_count=len(levels),
     )
-    _device().queue.write_texture(
-        {"texture": made},
-        np.ascontiguousarray(texture),
-        {"bytes_per_row": width * depth * bits // 8},
-        (width, height, 1),
-    )
+    for level, pixels in enumerate(levels):
+        height, width = pixels.shape[:2]
+        _device().queue.write_texture(
+            {"texture": made, "mip_level": level},
+            np.ascontiguousarray(pixels),
+            {"bytes_per_row": width * depth * bits // 8},
+            (width, height, 1),
+        )
     return made.create_view()
+
+
+def _halves(texture: Texture) -> list[Texture]:
+    """Return a texture of integers and its halves, as long as its sides are even."""
+    levels, exact = [texture], texture.astype(np.float64)
+    while not any(n % 2 for n in exact.shape[:2]):
+        exact = (exact[::2, ::2] + exact[1::2, ::2] + exact[::2, 1::2] + exact[1::2, 1::2]) / 4
+        levels.append(np.rint(exact).astype(texture.dtype))
+    return levels
 
 
 def _buffer(value: Uniform, declared: str, *, storage: bool) -> Any:

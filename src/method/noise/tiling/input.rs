@@ -240,7 +240,7 @@ impl Pyramid {
 }
 
 /// Means of two by two pixels.
-fn halved(
+pub(crate) fn halved(
     (width, height): (usize, usize),
     fine: &[f32],
     channels: usize,
