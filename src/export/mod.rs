@@ -58,8 +58,8 @@ pub struct ExportFile {
 pub fn export(texture_name: &str, program: &Program, target: Target) -> Result<Vec<ExportFile>> {
     let name = &names::identifier(texture_name, "texture");
     let plain = &names::plain(texture_name, "texture");
-    if program.tiling.is_some() {
-        let expected = "a target that can tile and blend, of which there is none yet";
+    if program.tiling.is_some() && !matches!(target, Target::Materialx | Target::Blender) {
+        let expected = "one that can tile and blend (materialx or blender)";
         return Err(Error::parameter("target", expected, target.show()));
     }
     match target {
