@@ -101,6 +101,22 @@ def test_the_graph_takes_a_scale_and_a_contrast(
     np.testing.assert_allclose(read[-rows:, :columns], one, atol=1e-3)
 
 
+@pytest.mark.parametrize("name", ["tiled_grey", "tiled_material"])
+def test_tiles_have_no_borders_where_hosts_make_mipmaps(
+    made: dict[str, texforge.NoiseTexture], name: str, tmp_path: Path
+) -> None:
+    texture = made[name]
+    document = written(texture, name, tmp_path)
+    width, height = texture.document["size"]
+    # At the photo's own pixels only coordinates that jump lead to smaller copies.
+    output = f"NG_{name}/basecolor_out"
+    plain, filtered = (
+        render_materialx(document, output, (height, width), mipmaps=mipmaps)
+        for mipmaps in (False, True)
+    )
+    assert np.abs(filtered - plain).max() < 1e-3
+
+
 def given(text: str, name: str, kind: str, value: str, other: str) -> str:
     """Return a document whose graph is given another value."""
     start = f'<input name="{name}" type="{kind}" value='
