@@ -15,8 +15,8 @@ mod tile;
 mod tiling;
 mod wgsl;
 
-use crate::base::error::{Error, Result};
-use crate::base::params::{Value as _, choice};
+use crate::base::error::Result;
+use crate::base::params::choice;
 
 pub use program::{Program, ProgramChannel, ProgramTerm, ProgramTiling};
 
@@ -59,10 +59,6 @@ pub struct ExportFile {
 pub fn export(texture_name: &str, program: &Program, target: Target) -> Result<Vec<ExportFile>> {
     let name = &names::identifier(texture_name, "texture");
     let plain = &names::plain(texture_name, "texture");
-    if program.tiling.is_some() && matches!(target, Target::Materialx | Target::Blender) {
-        let expected = "glsl, glsl-es, wgsl, hlsl or osl for a texture that is tiled and blended";
-        return Err(Error::parameter("target", expected, target.show()));
-    }
     match target {
         Target::Glsl => glsl::glsl(name, program, false),
         Target::GlslEs => glsl::glsl(name, program, true),

@@ -91,9 +91,11 @@ def expected(
     return clipped
 
 
-def main(target: texforge.ExportTarget, folder: Path) -> None:
+def main(
+    target: texforge.ExportTarget, folder: Path, made: dict[str, texforge.NoiseTexture]
+) -> None:
     """Write for each texture its export, and for each of its maps and sizes an array."""
-    for name, texture in textures().items():
+    for name, texture in made.items():
         place = folder / name
         place.mkdir()
         for file, content in texture.export(target, name=name).items():
@@ -106,4 +108,4 @@ def main(target: texforge.ExportTarget, folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(cast("texforge.ExportTarget", sys.argv[1]), Path(sys.argv[2]))
+    main(cast("texforge.ExportTarget", sys.argv[1]), Path(sys.argv[2]), textures())

@@ -16,6 +16,7 @@ import texforge
 
 Values = npt.NDArray[np.floating[Any]]
 
+NAMES = ["grey", "color", "material"]
 PHOTO = (112, 144)
 SIZE = (56, 72)
 """Height and width of the pictures that the OSL exports must show, the lowest row first."""

@@ -36,6 +36,12 @@ TARGETS = {
 CLOSEST, PERIODIC = 0, 2
 """Numbers of `filtertype` and of an `addressmode`."""
 
+MINIFIED = {
+    moderngl.NEAREST: moderngl.NEAREST_MIPMAP_NEAREST,
+    moderngl.LINEAR: moderngl.LINEAR_MIPMAP_LINEAR,
+}
+"""How a picture with mipmaps is read, by how it is without."""
+
 
 class Generated(NamedTuple):
     """Shaders of one element, and the files that the samplers of the pixel shader read."""
@@ -76,10 +82,13 @@ def generate_text(path: Path, element: str, target: Literal["genosl", "genmdl"])
     return str(_generate(path, element, target).getSourceCode("pixel"))
 
 
-def render_materialx(path: Path, element: str, size: tuple[int, int]) -> Picture:
+def render_materialx(
+    path: Path, element: str, size: tuple[int, int], *, mipmaps: bool = False
+) -> Picture:
     """Render an element with texture coordinates `(x + 0.5) / width` and `(y + 0.5) / height`.
 
-    As MaterialX has it, the last row of a file has the coordinate 0.
+    As MaterialX has it, the last row of a file has the coordinate 0. With `mipmaps` all pictures
+    have them, as in many hosts.
     """
     made = generate_glsl(path, element)
     with context() as gl:
@@ -87,8 +96,11 @@ def render_materialx(path: Path, element: str, size: tuple[int, int]) -> Picture
         for unit, (name, sampled) in enumerate(made.files.items()):
             texture = bind(program, name, _pixels(sampled.path), unit)
             texture.repeat_x, texture.repeat_y = sampled.repeated
-            if not sampled.closest:
-                texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
+            magnified = moderngl.NEAREST if sampled.closest else moderngl.LINEAR
+            texture.filter = (magnified, magnified)
+            if mipmaps:
+                texture.build_mipmaps()
+                texture.filter = (MINIFIED[magnified], magnified)
         columns = {
             "i_position": np.array([(-1, -1, 0), (3, -1, 0), (-1, 3, 0)], np.float32),
             "i_texcoord_0": np.array([(0, 0), (2, 0), (0, 2)], np.float32),

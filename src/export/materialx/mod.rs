@@ -1,5 +1,7 @@
 //! `MaterialX`: a graph of standard nodes, a material that uses it, and the pictures that it reads.
 
+mod tiles;
+
 use std::collections::HashSet;
 use std::fmt::Write as _;
 
@@ -18,12 +20,16 @@ use crate::signal::wavelet_noise::{Torus, spline_weights};
 /// spline's pieces meet, are no better than the odd ones below them.
 const FINE: usize = 5;
 
-/// The files `name.mtlx` and `name_noise_*.exr`.
+/// The files `name.mtlx` and `name_noise_*.exr`, or `name_table_*.exr` and `name_input_*.exr`.
 pub(super) fn materialx(program: &Program, name: &str) -> Result<Vec<ExportFile>> {
     let nodes = Nodes::new(program, FINE);
     let picture = |i: usize| format!("{name}_noise_{i}.exr");
     let mut graph = Graph::new(program.channels.len());
-    let sums = graph.sums(program, &nodes, picture);
+    let pixels = graph.pixels(program);
+    let sums = match &nodes.tiles {
+        Some(tiles) => graph.tiled(&pixels, tiles, &nodes.groups, name),
+        None => graph.sums(program, &nodes, pixels, picture),
+    };
     let channels: Vec<Node> = sums
         .into_iter()
         .zip(&nodes.groups)
@@ -43,6 +49,9 @@ pub(super) fn materialx(program: &Program, name: &str) -> Result<Vec<ExportFile>
     }
     let text = document(name, &graph, &outputs);
     let mut files = vec![ExportFile { name: format!("{name}.mtlx"), bytes: text.into_bytes() }];
+    if let Some(tiles) = &nodes.tiles {
+        files.extend(tiles::pictures(tiles, name)?);
+    }
     let planes = program.channels.len().min(2) * 2 - 1;
     for (i, (integers, scale)) in program.tiles.iter().enumerate() {
         let bytes = drawn(integers, *scale, &nodes.shifts[..planes])?;
@@ -62,7 +71,12 @@ fn drawn(integers: &[i16], scale: f32, shifts: &[[usize; 2]]) -> Result<Vec<u8>>
         shifts.iter().map(move |[dx, dy]| ((x + dx * FINE) % side, (y + dy * FINE) % side))
     });
     let samples = pixels.map(|(x, y)| f16::from_f32(plane[y * side + x])).collect();
-    let picture = Picture::new(side, side, shifts.len(), Samples::F16(samples), Encoding::Data)?;
+    exr(side, side, shifts.len(), samples)
+}
+
+/// Numbers as an EXR file.
+fn exr(height: usize, width: usize, channels: usize, samples: Vec<f16>) -> Result<Vec<u8>> {
+    let picture = Picture::new(height, width, channels, Samples::F16(samples), Encoding::Data)?;
     encode(&picture, Format::Exr, &WriteOptions::new(MapKind::Data))
 }
 
@@ -170,17 +184,22 @@ impl Graph {
         values[..if self.kind == "float" { 1 } else { TOGETHER }].to_vec()
     }
 
+    /// The place in pixels of the photo, v up.
+    fn pixels(&mut self, program: &Program) -> Node {
+        let size = program.size.map(f64::from);
+        let uv = self.node("texcoord", "vector2", "texcoord", &[]);
+        let scaled = self.two("multiply", "scaled", &uv, In::Port("scale", "vector2"));
+        self.two("multiply", "pixels", &scaled, In::Numbers(&size))
+    }
+
     /// The noise of every group of channels.
     fn sums(
         &mut self,
         program: &Program,
         nodes: &Nodes,
+        mut pixels: Node,
         picture: impl Fn(usize) -> String,
     ) -> Vec<Node> {
-        let size = program.size.map(f64::from);
-        let uv = self.node("texcoord", "vector2", "texcoord", &[]);
-        let scaled = self.two("multiply", "scaled", &uv, In::Port("scale", "vector2"));
-        let mut pixels = self.two("multiply", "pixels", &scaled, In::Numbers(&size));
         if let Some(turn) = nodes.turn {
             let [x, y] = turn.map(|row| {
                 let inputs = [("in1", In::Node(&pixels)), ("in2", In::Numbers(&row))];
@@ -337,6 +356,8 @@ impl Graph {
         let high = self.two("divide", &name("high"), &high, In::Number(1.055));
         let high = self.two("power", &name("high"), &high, In::Number(2.4));
         let high = self.two("subtract", &name("high"), &high, In::Number(THRESHOLD / 12.92));
+        // Where a host writes six decimals, black would be less than nothing.
+        let high = self.two("max", &name("high"), &high, In::Number(0.0));
         self.two("add", &name("light"), &low, In::Node(&high))
     }
 

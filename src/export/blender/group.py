@@ -5,9 +5,6 @@ import base64
 import bpy
 import numpy as np
 
-FINE = 3  # samples to a coefficient in the pictures
-SIDE = 256  # coefficients along the side of a tile
-
 
 class Graph:
     """Nodes of a group, laid out from left to right."""
@@ -44,6 +41,19 @@ class Graph:
             self.connect(value, socket)
         return node.outputs["Value"]
 
+    def parts(self, vector):
+        """Return the three numbers of a vector."""
+        node = self.node("ShaderNodeSeparateXYZ")
+        self.connect(vector, node.inputs["Vector"])
+        return list(node.outputs)
+
+    def lookup(self, image, at, label, interpolation, extension="REPEAT"):
+        """Return what an image shows at texture coordinates."""
+        settings = {"image": image, "interpolation": interpolation, "extension": extension}
+        node = self.node("ShaderNodeTexImage", label, **settings)
+        self.connect(at, node.inputs["Vector"])
+        return node.outputs["Color"]
+
     def combined(self, x, y, z, label=""):
         node = self.node("ShaderNodeCombineXYZ", label)
         for value, socket in zip((x, y, z), node.inputs):
@@ -51,43 +61,20 @@ class Graph:
         return node.outputs["Vector"]
 
 
-def spread(text):
-    """Return the coefficients of a tile from their text."""
-    return np.frombuffer(base64.b64decode(text), "<i2").reshape(SIDE, SIDE).astype(np.float64)
+def numbers(text, kind, *shape):
+    """Return an array of its bytes in base 64."""
+    return np.frombuffer(base64.b64decode(text), kind).reshape(shape).astype(np.float64)
 
 
-def drawn(coefficients):
-    """Return a tile's quadratic spline surface as the samples of a cubic one, along columns."""
-    fine = np.empty((SIDE, FINE, coefficients.shape[1]))
-    for k in range(FINE):
-        # From the nearest coefficient.
-        beyond = int(2 * k > FINE)
-        t = k / FINE - beyond
-        near = np.roll(coefficients, -beyond, axis=0)
-        first = 0.5 * (0.5 - t) ** 2
-        last = 0.5 * (0.5 + t) ** 2
-        fine[:, k] = (1 - first - last) * near
-        fine[:, k] += first * np.roll(near, 1, axis=0) + last * np.roll(near, -1, axis=0)
-    fine = fine.reshape(SIDE * FINE, -1)
-    # The cubic spline through these values: its filter undone on the torus.
-    turn = 2 * np.pi * np.fft.rfftfreq(SIDE * FINE)
-    spectrum = np.fft.rfft(fine, axis=0) * (3 / (2 + np.cos(turn)))[:, None]
-    return np.fft.irfft(spectrum, SIDE * FINE, axis=0)
-
-
-def picture(name, tile, shifts):
-    """Return an image of a tile, moved differently in red, green and blue."""
-    coefficients = spread(tile["coefficients"]) * tile["scale"]
-    surface = drawn(drawn(coefficients).T).T
-    pixels = np.ones((SIDE * FINE, SIDE * FINE, 4), np.float32)
-    for k, (x, y) in enumerate(shifts):
-        pixels[..., k] = np.roll(surface, (-y * FINE, -x * FINE), axis=(0, 1))[::-1]
+def picture(name, rows):
+    """Return an image of numbers: rows from the top, with one or three numbers in each pixel."""
+    height, width = rows.shape[:2]
+    pixels = np.ones((height, width, 4), np.float32)
+    pixels[..., :3] = rows[::-1]
     old = bpy.data.images.get(name)
     if old is not None:
         bpy.data.images.remove(old)
-    image = bpy.data.images.new(
-        name, SIDE * FINE, SIDE * FINE, alpha=True, float_buffer=True, is_data=True
-    )
+    image = bpy.data.images.new(name, width, height, alpha=True, float_buffer=True, is_data=True)
     image.alpha_mode = "CHANNEL_PACKED"
     image.use_half_precision = False
     image.pixels.foreach_set(pixels.ravel())
@@ -135,22 +122,6 @@ def histogram(graph, noise, shape):
         piece = graph.vector("MULTIPLY_ADD", t, piece, c1)
         value = graph.vector("MULTIPLY_ADD", t, piece, value)
     return value
-
-
-def noise_of(graph, group, place, bands, images):
-    """Return the sum of a group's bands."""
-    total = (0, 0, 0)
-    for band, weights, offset in zip(bands, group["weights"], group["offsets"]):
-        if not any(weights):
-            continue
-        at = graph.vector("DIVIDE", place, (*band["span"], 1))
-        at = graph.vector("ADD", at, (*offset, 0))
-        image = graph.node(
-            "ShaderNodeTexImage", "noise", image=images[band["tile"]], interpolation="Cubic"
-        )
-        graph.connect(at, image.inputs["Vector"])
-        total = graph.vector("MULTIPLY_ADD", image.outputs["Color"], weights, total)
-    return total
 
 
 def clamped(graph, value):
@@ -220,24 +191,17 @@ def build(texture):
     scale.default_value = contrast.default_value = 1
     scale.description = "Number of photos to a unit of Vector"
     contrast.description = "Factor of what differs from the mean"
-    images = [
-        picture(f"{texture['name']} noise {i}", tile, texture["shifts"])
-        for i, tile in enumerate(texture["tiles"])
-    ]
 
     graph = Graph(group)
     given = graph.node("NodeGroupInput").outputs
     place = graph.vector("SCALE", given["Vector"], label="photos")
     graph.connect(given["Scale"], place.node.inputs["Scale"])
     place = graph.vector("MULTIPLY", place, (*texture["size"], 0), label="pixels")
-    if texture["turn"]:
-        x, y = (graph.vector("DOT_PRODUCT", place, (*row, 0)) for row in texture["turn"])
-        place = graph.combined(x, y, 0, label="turned")
+    channels = [
+        histogram(graph, noise, part["shape"]) if part["shape"] else noise
+        for part, noise in zip(texture["groups"], noises(graph, texture, place))
+    ]
     values = list(texture["mean"])
-    channels = []
-    for part in texture["groups"]:
-        noise = noise_of(graph, part, place, texture["bands"], images)
-        channels.append(histogram(graph, noise, part["shape"]) if part["shape"] else noise)
     for i, row in enumerate(texture["matrix"]):
         for noise, weights in zip(channels, row):
             part = graph.vector("DOT_PRODUCT", noise, weights, label=f"value {i + 1}")

@@ -5,7 +5,12 @@
 //! image lookup reads it. Neighbouring channels read a band at places that are a fixed way apart, in
 //! coefficients; so three channels are the red, green and blue of one picture.
 //!
-//! Texture coordinates have v up and repeat with 1; one unit is the photo's width or height.
+//! Texture coordinates have v up and repeat with 1; one unit is the photo's width or height. Of a tiled
+//! texture the pictures are another, see [`Tiles`].
+
+mod tiles;
+
+pub(super) use tiles::Tiles;
 
 use super::{Program, ProgramChannel};
 use crate::method::noise::KNOTS;
@@ -25,6 +30,8 @@ pub(super) struct Nodes {
     pub(super) groups: Vec<Group>,
     /// By how many coefficients (x, y) green and blue are before red in the pictures.
     pub(super) shifts: [[usize; 2]; TOGETHER],
+    /// Instead of terms, of a texture that is tiled.
+    pub(super) tiles: Option<Tiles>,
 }
 
 /// Up to three channels that are looked up together; numbers of those that are missing are 0.
@@ -32,7 +39,7 @@ pub(super) struct Nodes {
 pub(super) struct Group {
     /// Of each term, what is added to the place in the picture; 0..1.
     pub(super) offsets: Vec<[f64; 2]>,
-    /// Of each term, by what the values are multiplied. The sum is in standard deviations for channels
+    /// Of each term, or of the tiles, by what the values are multiplied. The sum is in standard deviations for channels
     /// with a histogram.
     pub(super) weights: Vec<[f64; TOGETHER]>,
     /// The histograms, if a channel has one.
@@ -72,13 +79,16 @@ impl Nodes {
         };
         let group = |channels: &[ProgramChannel]| Group {
             offsets: channels[0].offsets.iter().zip(&spans).map(|(&o, &s)| offset(o, s)).collect(),
-            weights: (0..spans.len()).map(|t| each(channels, |c| weight(c, t))).collect(),
+            weights: (0..channels[0].weights.len())
+                .map(|t| each(channels, |c| weight(c, t)))
+                .collect(),
             shape: GroupShape::new(channels),
         };
         Self {
             turn: program.turn.map(|[c, s]| [[c, -s], [s, c]]),
             groups: program.channels.chunks(TOGETHER).map(group).collect(),
             shifts: std::array::from_fn(|k| shift(program, k)),
+            tiles: program.tiling.as_ref().map(|tiling| Tiles::new(tiling, program.size[1])),
             spans,
         }
     }
