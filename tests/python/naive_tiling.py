@@ -102,7 +102,7 @@ class Tiles:
                 if other in power:
                     alike = self.table[q % SIDE, p % SIDE, 2 + way] / 255
                     variance += 2 * power[p, q] * power[other] * alike
-        return total / np.sqrt(variance)
+        return np.asarray(total / np.sqrt(variance))
 
     def at(self, points: Array) -> Array:
         """Return all channels of the maps at points (x, y)."""

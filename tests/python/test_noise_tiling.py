@@ -223,7 +223,7 @@ REFUSED: dict[str, tuple[type[Exception], Callable[[texforge.NoiseTexture], obje
     ),
     "cells too large": (
         texforge.ParameterError,
-        lambda _: texforge.fit_noise(stones(), model="tiling", cell=64),
+        lambda _: texforge.fit_noise(stones(), model="tiling", cell=80),
     ),
     "an unknown model": (
         texforge.ParameterError,

@@ -204,7 +204,8 @@ impl Evaluator {
         if let Some(tiling) = &self.tiling {
             let mut noise = vec![0.0; self.channels.len()];
             for (point, out) in points.iter().zip(out.chunks_exact_mut(self.channels())) {
-                self.tiles(tiling, &filtered, *point, &mut noise);
+                tiling.at(*point, filtered[0].level, &mut noise);
+                noise.iter_mut().zip(&filtered).for_each(|(value, f)| *value *= f.weights[0]);
                 self.colour(&filtered, &noise, out);
             }
             return;
@@ -214,13 +215,6 @@ impl Evaluator {
             let block = PlaneNoise { evaluator: self, filtered: &filtered, points, noise };
             Arch::new().dispatch(block);
         });
-    }
-
-    /// The independent channels of a tiled texture at a point.
-    #[inline]
-    fn tiles(&self, tiling: &Tiling, filtered: &[Filtered], point: [f64; 2], noise: &mut [f32]) {
-        tiling.at(point, filtered[0].level, noise);
-        noise.iter_mut().zip(filtered).for_each(|(value, f)| *value *= f.weights[0]);
     }
 
     /// Standard deviations of the independent channels.

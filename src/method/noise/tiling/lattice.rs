@@ -167,10 +167,10 @@ mod tests {
                 prop_assert!(here.index < lattice.len());
                 prop_assert_eq!(here.index, there.index);
                 prop_assert!((here.weight - there.weight).abs() < 1e-4);
-                for axis in 0..2 {
+                for ((here, there), way) in here.at.iter().zip(there.at).zip(way) {
                     // Whole pixels for a period of whole pixels.
-                    prop_assert!((there.at[axis] - here.at[axis] - way[axis]).abs() < 1e-6);
-                    prop_assert!((here.at[axis] - here.at[axis].round()).abs() < 1e-6);
+                    prop_assert!((there - here - way).abs() < 1e-6);
+                    prop_assert!((here - here.round()).abs() < 1e-6);
                 }
             }
         }

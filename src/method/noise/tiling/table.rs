@@ -263,16 +263,17 @@ impl Search<'_> {
         let (few, all) = (shown(&self.coarse, FEW), shown(&self.smooth, SAMPLES));
         let roughly = |choice: [u8; 2]| cost(&self.coarse, self.places.pixel(choice), &few);
         let closely = |choice: [u8; 2]| cost(&self.smooth, self.places.pixel(choice), &all);
-        let mut tried: Vec<(f32, [u8; 2])> = tried
+        let mut tried: Vec<Tried> = tried
             .into_par_iter()
             .with_min_len(64)
             .map(|choice| (roughly(choice), choice))
             .collect();
-        let (_, &mut (median, _), _) = tried.select_nth_unstable_by(TRIED / 2, by_cost);
+        let (_, &mut (median, _), _) =
+            tried.select_nth_unstable_by(TRIED / 2, |a, b| by_cost(*a, *b));
         let per_use = USED * median / usage.mean();
         let total = |choice: [u8; 2], cost: f32| cost + per_use * usage.at(choice);
         tried.iter_mut().for_each(|(cost, choice)| *cost = total(*choice, *cost));
-        tried.select_nth_unstable_by(CLOSELY, by_cost);
+        tried.select_nth_unstable_by(CLOSELY, |a, b| by_cost(*a, *b));
         let kept = tried[..CLOSELY].iter().map(|&(_, choice)| choice).chain(before);
         let kept = kept.map(|choice| (choice, total(choice, closely(choice))));
         let mut best = kept.reduce(|a, b| if b.1 < a.1 { b } else { a }).unwrap_or(([0; 2], 0.0));
@@ -347,8 +348,11 @@ fn cost(plane: &Plane, [x, y]: [i32; 2], shown: &[Shown]) -> f32 {
     sum
 }
 
+/// A choice and what it costs.
+type Tried = (f32, [u8; 2]);
+
 /// By cost, and as the sort is unstable, by choice.
-fn by_cost(a: &(f32, [u8; 2]), b: &(f32, [u8; 2])) -> std::cmp::Ordering {
+fn by_cost(a: Tried, b: Tried) -> std::cmp::Ordering {
     a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))
 }
 
