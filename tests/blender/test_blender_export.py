@@ -42,7 +42,7 @@ MAPS = [
 def exports(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with a folder for each texture: its script, and what its maps must show."""
     folder = tmp_path_factory.mktemp("exports")
-    command = [PYTHON, "-m", "tests.python.node_exports", "blender", folder]
+    command: list[str | Path] = [PYTHON, "-m", "tests.python.node_exports", "blender", folder]
     try:
         done = subprocess.run(
             command, cwd=HERE.parent.parent, capture_output=True, text=True, check=False
