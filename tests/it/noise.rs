@@ -206,7 +206,7 @@ mod render {
         let turn = |k: usize| std::f64::consts::TAU * (k % n) as f64 / n as f64;
         let table: Vec<_> = (0..n).map(|k| turn(k).sin_cos()).collect();
         let (mut sums, mut powers) = ([0.0; 3], [0.0; 3]);
-        for (x, y) in (0..8).flat_map(|x| (0..16).map(move |y| (x, y - 8))) {
+        for (x, y) in (0_i32..8).flat_map(|x| (0_i32..16).map(move |y| (x, y - 8))) {
             let square = f64::from(x * x + y * y);
             let octave = (0.5 * square.max(0.1).log2()).floor() as i32;
             if !(0..3).contains(&octave) || (x == 0 && y < 0) {
