@@ -41,19 +41,22 @@ const GLSL: Language = Language {
     },
 };
 
-/// `NAME.glsl`, `NAME_example.frag` and the picture of coefficients.
+/// `NAME.glsl`, `NAME_example.frag` (`NAME_example_es.frag`) and the pictures.
 pub(super) fn glsl(name: &str, program: &Program, es: bool) -> Result<Vec<ExportFile>> {
     let functions =
         heading(name, program, &about_pictures(name, program)) + &GLSL.texture(name, program);
-    let version = if es {
-        "#version 300 es\nprecision highp float;\nprecision highp int;\nprecision highp sampler2D;\n"
+    // Both may be written to one folder.
+    let (version, suffix) = if es {
+        let precision =
+            "precision highp float;\nprecision highp int;\nprecision highp sampler2D;\n";
+        (format!("#version 300 es\n{precision}"), "_es")
     } else {
-        "#version 330\n"
+        ("#version 330\n".to_owned(), "")
     };
     let example = format!("{version}{functions}{}", example(name, program));
     let mut files = vec![
         ExportFile { name: format!("{name}.glsl"), bytes: functions.into_bytes() },
-        ExportFile { name: format!("{name}_example.frag"), bytes: example.into_bytes() },
+        ExportFile { name: format!("{name}_example{suffix}.frag"), bytes: example.into_bytes() },
     ];
     files.extend(pictures(name, program)?);
     Ok(files)

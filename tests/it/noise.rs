@@ -419,7 +419,9 @@ mod change {
     #[test]
     fn exports_are_files_in_a_folder() {
         let folder = fitted();
-        let args = ["noise", "export", "stone.json", "--to", "glsl,wgsl", "-o", "out"];
+        // All there are: they share one folder.
+        let all = "glsl,glsl-es,wgsl,hlsl,osl,materialx,blender";
+        let args = ["noise", "export", "stone.json", "--to", all, "-o", "out"];
         let v = json(&folder, &[&args[..], &["--json"]].concat());
         let files = v["files"].as_array().expect("files");
         assert!(files.iter().any(|f| f["target"] == "glsl"));

@@ -18,6 +18,7 @@ PHOTOS = Path(__file__).parents[3] / "shared" / "exemplars" / "stochastic"
 SIDE = 256
 """Of the pieces whose spectra are averaged."""
 OCTAVES = 6
+RENDERS = 4
 
 
 class Fidelity(NamedTuple):
@@ -45,30 +46,37 @@ def octaves(plane: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
 
 @functools.cache
 def measured(path: Path, weights: Any) -> Fidelity:
-    """Compare a photo, reduced to about a megapixel, with four renders of its texture."""
+    """Compare a photo, reduced to about a megapixel, with renders of its noise."""
     photo = np.asarray(texforge.read_image(path))
     height, width = photo.shape[:2]
     factor = max(1, min(height, width) // 512)
     height, width = height // factor, width // factor
     blocks = photo[: height * factor, : width * factor].reshape(height, factor, width, factor, -1)
     unit = np.rint(blocks.mean((1, 3), dtype=float)).astype(np.uint8) / 255
-    texture = texforge.fit_noise((unit * 255).round().astype(np.uint8), weights=weights)
+    texture = texforge.fit_noise(
+        (unit * 255).round().astype(np.uint8), model="wavelet", weights=weights
+    )
+    rng = np.random.default_rng(0)
+    # Whole pixels, as in the photo: between them the noise is a little weaker.
+    origins = rng.integers(-1_000_000, 1_000_000, (RENDERS, 2))
     renders = [
-        np.asarray(texture.render((height, width), origin=origin, dtype="float32"), float)
-        for origin in ((0, 0), (70001, 3001), (-5000, 90000), (123456, 654321))
+        np.asarray(texture.render((height, width), origin=(x, y), dtype="float32"), float)
+        for x, y in origins.tolist()
     ]
-    made = np.stack(renders).reshape(4, height, width, -1)
+    made = np.stack(renders).reshape(RENDERS, height, width, -1)
     channels = range(unit.shape[2])
     ratio = [
         np.mean([octaves(one[..., c]) for one in made], axis=0) / octaves(unit[..., c])
         for c in channels
     ]
+    # Pixels far from each other: the coarsest octaves have few waves in a picture.
+    pixels = texture.at(rng.integers(-1_000_000, 1_000_000, (400_000, 2)) + 0.5).astype(float)
     of_photo, of_made = (
-        np.atleast_2d(np.cov(v.reshape(-1, len(channels)).T)) for v in (unit, made)
+        np.atleast_2d(np.cov(v.reshape(-1, len(channels)).T)) for v in (unit, pixels)
     )
     ranks = (np.arange(4096) + 0.5) / 4096
     moved = [
-        np.abs(np.quantile(unit[..., c], ranks) - np.quantile(made[..., c], ranks)).mean()
+        np.abs(np.quantile(unit[..., c], ranks) - np.quantile(pixels[..., c], ranks)).mean()
         for c in channels
     ]
     return Fidelity(
@@ -110,7 +118,7 @@ def test_textures_have_the_statistics_of_photographs() -> None:
     assert np.median(errors) < 1, report()
     for name, one in ours.items():
         assert rms(one.octaves) < rms(direct[name].octaves), (name, report())
-    assert statistics.median(one.covariance for one in ours.values()) < 0.02, report()
+    assert max(one.covariance for one in ours.values()) < 0.02, report()
     assert statistics.median(one.histogram for one in ours.values()) < 0.01, report()
 
 
