@@ -25,9 +25,9 @@ fn sand(side: usize, channels: usize) -> Picture {
     Picture::new(side, side, channels, samples, Encoding::Srgb).unwrap()
 }
 
-fn fitted(ctx: &Ctx, photo: &Picture, directions: &str) -> NoiseTexture {
+fn fitted(ctx: &Ctx, photo: &Picture, model: &str) -> NoiseTexture {
     let mut params = NoiseParams::default();
-    params.set("directions", directions).unwrap();
+    params.set("model", model).unwrap();
     let map = NamedMap { name: "basecolor", kind: MapKind::Color, picture: photo };
     fit_noise(ctx, &[map], None, &params).unwrap().0
 }
@@ -35,7 +35,7 @@ fn fitted(ctx: &Ctx, photo: &Picture, directions: &str) -> NoiseTexture {
 fn main() {
     let (one, all) = (Ctx::new(0, 1).unwrap(), Ctx::new(0, 0).unwrap());
     let (grey, colour) = (sand(512, 1), sand(512, 3));
-    let texture = fitted(&one, &grey, "isotropic");
+    let texture = fitted(&one, &grey, "wavelet");
 
     // The answer first: a picture is its points, bit for bit, on any number of threads.
     let small = RenderParams { samples: SampleType::F32, ..RenderParams::new((90, 70)) };
@@ -48,13 +48,19 @@ fn main() {
 
     let mut bench = Criterion::default().without_plots().sample_size(10).configure_from_args();
     let mut group = bench.benchmark_group("fit 512x512");
-    group.bench_function("grey", |b| b.iter(|| fitted(&one, black_box(&grey), "isotropic")));
-    group.bench_function("RGB", |b| b.iter(|| fitted(&one, black_box(&colour), "isotropic")));
+    group.bench_function("grey", |b| b.iter(|| fitted(&one, black_box(&grey), "wavelet")));
+    group.bench_function("RGB", |b| b.iter(|| fitted(&one, black_box(&colour), "wavelet")));
     group.bench_function("RGB, all cores", |b| {
-        b.iter(|| fitted(&all, black_box(&colour), "isotropic"));
+        b.iter(|| fitted(&all, black_box(&colour), "wavelet"));
     });
     group.bench_function("RGB, oriented", |b| {
         b.iter(|| fitted(&one, black_box(&colour), "oriented"));
+    });
+    group.bench_function("RGB, tiling", |b| {
+        b.iter(|| fitted(&one, black_box(&colour), "tiling"));
+    });
+    group.bench_function("RGB, tiling, all cores", |b| {
+        b.iter(|| fitted(&all, black_box(&colour), "tiling"));
     });
     group.finish();
 
@@ -64,6 +70,14 @@ fn main() {
     group.throughput(Throughput::Elements(octaves * 1024 * 1024));
     for (name, ctx) in [("one thread", &one), ("all cores", &all)] {
         group.bench_function(name, |b| b.iter(|| texture.render(ctx, &params).unwrap()));
+    }
+    group.finish();
+
+    let tiles = fitted(&one, &colour, "tiling");
+    let mut group = bench.benchmark_group("RGB 1024x1024 of tiles, pixels");
+    group.throughput(Throughput::Elements(1024 * 1024));
+    for (name, ctx) in [("one thread", &one), ("all cores", &all)] {
+        group.bench_function(name, |b| b.iter(|| tiles.render(ctx, &params).unwrap()));
     }
     group.finish();
 

@@ -203,8 +203,9 @@ impl Evaluator {
         let filtered = self.filtered(filter);
         if let Some(tiling) = &self.tiling {
             let mut noise = vec![0.0; self.channels.len()];
+            let mut known = None;
             for (point, out) in points.iter().zip(out.chunks_exact_mut(self.channels())) {
-                tiling.at(*point, filtered[0].level, &mut noise);
+                tiling.at(*point, filtered[0].level, &mut known, &mut noise);
                 noise.iter_mut().zip(&filtered).for_each(|(value, f)| *value *= f.weights[0]);
                 self.colour(&filtered, &noise, out);
             }

@@ -230,6 +230,11 @@ impl Pyramid {
         let ((x0, x1, tx), (y0, y1, ty)) = (place(at[0], *width), place(at[1], *height));
         let pixel =
             |x: usize, y: usize| &samples[(y * width + x) * self.channels..][..self.channels];
+        if tx == 0.0 && ty == 0.0 {
+            // Pixels of the photo at its own scale: the same, faster.
+            out.iter_mut().zip(pixel(x0, y0)).for_each(|(out, v)| *out += weight * v);
+            return;
+        }
         let corners = [pixel(x0, y0), pixel(x1, y0), pixel(x0, y1), pixel(x1, y1)];
         for (c, out) in out.iter_mut().enumerate() {
             let [a, b, d, e] = corners.map(|corner| corner[c]);

@@ -12,15 +12,19 @@ pub(super) struct Lattice {
     shear: i64,
 }
 
-/// A vertex of the triangle around a point.
+/// A triangle: column and row of its cell, and whether it is the half that touches the row before.
+pub(super) type Triangle = (i64, i64, bool);
+
+/// The corners of a triangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Vertex {
-    /// Its number.
-    pub(super) index: usize,
-    /// Where it lies, in whole pixels.
-    pub(super) at: [f64; 2],
-    /// Barycentric coordinate of the point: 1 at the vertex, 0 on the other side of the triangle.
-    pub(super) weight: f32,
+pub(super) struct Corners {
+    /// Their numbers.
+    pub(super) index: [usize; 3],
+    /// Where they lie, in whole pixels.
+    pub(super) at: [[f64; 2]; 3],
+    /// Of the sides 01, 02 and 12, which lead along [`NEIGHBOURS`] in this order, the number of the corner
+    /// where each begins.
+    pub(super) begins: [usize; 3],
 }
 
 /// Steps along the lattice to three neighbours; the other three are opposite.
@@ -77,25 +81,30 @@ impl Lattice {
         [index as i64 % self.columns, index as i64 / self.columns]
     }
 
-    /// The corners of the triangle around a point; and of its sides 01, 02 and 12, which lead along
-    /// `NEIGHBOURS` in this order, the corner where each begins.
-    pub(super) fn triangle(&self, [x, y]: [f64; 2]) -> ([Vertex; 3], [usize; 3]) {
+    /// The triangle around a point, and the point's barycentric coordinates: 1 at a corner, 0 on the
+    /// side across.
+    #[inline]
+    pub(super) fn triangle(&self, [x, y]: [f64; 2]) -> (Triangle, [f32; 3]) {
         let v = y / self.cell[1];
         let u = x / self.cell[0] - 0.5 * v;
         let (i, j) = (u.floor(), v.floor());
         let (fu, fv) = (u - i, v - j);
-        let (i, j) = (i as i64, j as i64);
-        let (corners, weights, begins) = if fu + fv < 1.0 {
-            ([[i, j], [i + 1, j], [i, j + 1]], [1.0 - fu - fv, fu, fv], [0, 0, 1])
+        let first = fu + fv < 1.0;
+        let weights =
+            if first { [1.0 - fu - fv, fu, fv] } else { [fu + fv - 1.0, 1.0 - fu, 1.0 - fv] };
+        ((i as i64, j as i64, first), weights.map(|w| w as f32))
+    }
+
+    /// The corners of a triangle, in the order of the coordinates.
+    pub(super) fn corners(&self, (i, j, first): Triangle) -> Corners {
+        let (corners, begins) = if first {
+            ([[i, j], [i + 1, j], [i, j + 1]], [0, 0, 1])
         } else {
-            let corners = [[i + 1, j + 1], [i, j + 1], [i + 1, j]];
-            (corners, [fu + fv - 1.0, 1.0 - fu, 1.0 - fv], [1, 2, 2])
+            ([[i + 1, j + 1], [i, j + 1], [i + 1, j]], [1, 2, 2])
         };
-        let corners = std::array::from_fn(|k| {
-            let (index, at) = self.vertex(corners[k][0], corners[k][1]);
-            Vertex { index, at, weight: weights[k] as f32 }
-        });
-        (corners, begins.map(|k: usize| corners[k].index))
+        let corners = corners.map(|[i, j]| self.vertex(i, j));
+        let index = corners.map(|(index, _)| index);
+        Corners { index, at: corners.map(|(_, at)| at), begins: begins.map(|k: usize| index[k]) }
     }
 
     /// The weight of a vertex at a point that lies (x, y) from it.
@@ -118,33 +127,35 @@ mod tests {
 
     proptest! {
         #[test]
-        fn weights_are_barycentric(x in -1e4..1e4f64, y in -1e4..1e4f64, a in 1u32..60, b in 1u32..90) {
+        fn weights_are_barycentric(
+            x in -1e4..1e4f64, y in -1e4..1e4f64, a in 1u32..60, b in 1u32..90,
+        ) {
             let lattice = Lattice::endless([2 * a, b], 32);
-            let (corners, _) = lattice.triangle([x, y]);
-            let sum = |of: &dyn Fn(&Vertex) -> f64| -> f64 {
-                corners.iter().map(|c| f64::from(c.weight) * of(c)).sum()
+            let (triangle, weights) = lattice.triangle([x, y]);
+            let corners = lattice.corners(triangle);
+            let sum = |of: [f64; 3]| -> f64 {
+                weights.iter().zip(of).map(|(w, v)| f64::from(*w) * v).sum()
             };
-            prop_assert!((sum(&|_| 1.0) - 1.0).abs() < 1e-5);
-            prop_assert!((sum(&|c| c.at[0]) - x).abs() < 1e-2);
-            prop_assert!((sum(&|c| c.at[1]) - y).abs() < 1e-2);
-            for corner in corners {
-                prop_assert!(corner.weight >= 0.0);
-                let alone = lattice.weight([x - corner.at[0], y - corner.at[1]]);
-                prop_assert!((alone - f64::from(corner.weight)).abs() < 1e-5);
+            prop_assert!((sum([1.0; 3]) - 1.0).abs() < 1e-5);
+            prop_assert!((sum(corners.at.map(|at| at[0])) - x).abs() < 1e-2);
+            prop_assert!((sum(corners.at.map(|at| at[1])) - y).abs() < 1e-2);
+            for (weight, at) in weights.iter().zip(corners.at) {
+                prop_assert!(*weight >= 0.0);
+                let alone = lattice.weight([x - at[0], y - at[1]]);
+                prop_assert!((alone - f64::from(*weight)).abs() < 1e-5);
             }
         }
 
         #[test]
         fn sides_begin_where_the_neighbours_say(x in -500.0..500.0f64, y in -500.0..500.0f64) {
             let lattice = Lattice::endless([20, 17], 32);
-            let (corners, begins) = lattice.triangle([x, y]);
-            for (k, pair) in [[0, 1], [0, 2], [1, 2]].into_iter().enumerate() {
-                let [from, to] = if corners[pair[0]].index == begins[k] { pair } else { [pair[1], pair[0]] };
-                prop_assert_eq!(corners[from].index, begins[k]);
+            let Corners { index, at, begins } = lattice.corners(lattice.triangle([x, y]).0);
+            for (k, [a, b]) in [[0, 1], [0, 2], [1, 2]].into_iter().enumerate() {
+                let [from, to] = if index[a] == begins[k] { [a, b] } else { [b, a] };
+                prop_assert_eq!(index[from], begins[k]);
                 let [right, down] = NEIGHBOURS[k];
                 let way = [20.0 * (right as f64 + 0.5 * down as f64), 17.0 * down as f64];
-                let is = [0, 1].map(|axis| corners[to].at[axis] - corners[from].at[axis]);
-                prop_assert_eq!(is, way);
+                prop_assert_eq!([0, 1].map(|axis| at[to][axis] - at[from][axis]), way);
             }
         }
 
@@ -157,17 +168,18 @@ mod tests {
             let lattice = Lattice::fitting([40, 34], period);
             let [a, b] = lattice.cell();
             prop_assert!(a <= 40.0 && b <= 34.0);
-            // A sixteenth keeps sums exact, so that a point stays in its triangle.
-            let [x, y] = [x, y].map(|v| (16.0 * v).round() / 16.0 + 1e-3);
             let way = [f64::from(right) * period[0], f64::from(down) * period[1]];
-            let (here, begins) = lattice.triangle([x, y]);
-            let (there, others) = lattice.triangle([x + way[0], y + way[1]]);
-            prop_assert_eq!(begins, others);
-            for (here, there) in here.iter().zip(there) {
-                prop_assert!(here.index < lattice.len());
-                prop_assert_eq!(here.index, there.index);
-                prop_assert!((here.weight - there.weight).abs() < 1e-4);
-                for ((here, there), way) in here.at.iter().zip(there.at).zip(way) {
+            let (triangle, weights) = lattice.triangle([x, y]);
+            // At its very edge rounding decides in which a point lies.
+            prop_assume!(weights.iter().all(|w| *w > 1e-6));
+            let (other, others) = lattice.triangle([x + way[0], y + way[1]]);
+            let (here, there) = (lattice.corners(triangle), lattice.corners(other));
+            prop_assert_eq!(here.begins, there.begins);
+            prop_assert_eq!(here.index, there.index);
+            for k in 0..3 {
+                prop_assert!(here.index[k] < lattice.len());
+                prop_assert!((weights[k] - others[k]).abs() < 1e-4);
+                for ((here, there), way) in here.at[k].iter().zip(there.at[k]).zip(way) {
                     // Whole pixels for a period of whole pixels.
                     prop_assert!((there - here - way).abs() < 1e-6);
                     prop_assert!((here - here.round()).abs() < 1e-6);

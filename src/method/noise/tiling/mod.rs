@@ -21,7 +21,7 @@ use crate::base::ctx::Ctx;
 use crate::base::error::Result;
 use crate::method::noise::score::blurred;
 use input::{Input, Pyramid};
-use lattice::Lattice;
+use lattice::{Lattice, Triangle};
 use table::{Places, Plane, Search, Table};
 
 /// How a texture is tiled and blended.
@@ -139,6 +139,15 @@ fn choose(
     table::choose(ctx, &search)
 }
 
+/// What a triangle's corners show.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Tiles {
+    /// From a point to its place in the input.
+    ways: [[f64; 2]; 3],
+    /// Correlations of corners 0 and 1, 0 and 2, 1 and 2.
+    alike: [f32; 3],
+}
+
 /// A layout made ready to give values at points.
 #[derive(Debug, Clone)]
 pub(super) struct Tiling {
@@ -186,21 +195,39 @@ impl Tiling {
     }
 
     /// Sets `out` to the channels' standard normal numbers at a point, between the levels of the input
-    /// that `level` says.
+    /// that `level` says. `known` is the triangle of the point before, which often is this one's, too.
     #[inline]
-    pub(super) fn at(&self, point: [f64; 2], level: f32, out: &mut [f32]) {
+    pub(super) fn at(
+        &self,
+        point: [f64; 2],
+        level: f32,
+        known: &mut Option<(Triangle, Tiles)>,
+        out: &mut [f32],
+    ) {
+        let (triangle, weights) = self.lattice.triangle(point);
+        let tiles = match known {
+            Some((of, tiles)) if *of == triangle => tiles,
+            _ => &known.insert((triangle, self.tiles(triangle))).1,
+        };
         out.fill(0.0);
-        let (corners, begins) = self.lattice.triangle(point);
-        let alike =
-            std::array::from_fn(|k| f32::from(self.table.alike[begins[k]][k]) * (1.0 / 255.0));
-        let shares = blend::shares(corners.map(|corner| corner.weight), alike, self.sharpness);
-        for (corner, share) in corners.iter().zip(shares) {
+        let shares = blend::shares(weights, tiles.alike, self.sharpness);
+        for (way, share) in tiles.ways.iter().zip(shares) {
             if share != 0.0 {
-                let choice = self.places.at(self.table.choices[corner.index]);
-                let at = std::array::from_fn(|k| choice[k] + (point[k] - corner.at[k]));
+                let at = std::array::from_fn(|k| point[k] + way[k]);
                 self.pyramid.add(at, level, share, out);
             }
         }
+    }
+
+    /// What a triangle's corners show.
+    fn tiles(&self, triangle: Triangle) -> Tiles {
+        let corners = self.lattice.corners(triangle);
+        let way = |corner: usize| {
+            let place = self.places.at(self.table.choices[corners.index[corner]]);
+            std::array::from_fn(|k| place[k] - corners.at[corner][k])
+        };
+        let alike = |k: usize| f32::from(self.table.alike[corners.begins[k]][k]) * (1.0 / 255.0);
+        Tiles { ways: [0, 1, 2].map(way), alike: [0, 1, 2].map(alike) }
     }
 
     /// Standard deviation of every channel in every level of the input.
