@@ -6,7 +6,7 @@ use std::sync::Arc;
 use clap::{Arg, ArgAction, ArgMatches, Command, value_parser};
 use serde_json::{Value, json};
 
-use super::{about, document, output, path, read, shown, target, write};
+use super::{about, document, made_of, output, path, read, shown, target, write};
 use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
 use crate::cli::args;
@@ -169,7 +169,8 @@ fn said(
 ) -> Value {
     let (bytes, bands) = (texture.to_json().len(), texture.document().terms().len());
     let seed = texture.document().seed;
-    session.console.say(&format!("{}  {bytes} bytes, {bands} bands, seed {seed}", shown(output)));
+    let (shown, made_of) = (shown(output), made_of(bands));
+    session.console.say(&format!("{shown}  {bytes} bytes, {made_of}, seed {seed}"));
     json!({
         "schema_version": SCHEMA_VERSION,
         "verb": verb,

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::{ArgMatches, Command};
 use serde_json::json;
 
-use super::{output, path, shown, target, write};
+use super::{made_of, output, path, shown, target, write};
 use crate::base::ctx::Ctx;
 use crate::base::error::Result;
 use crate::cli::maps::{self, Wanted};
@@ -107,10 +107,7 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<serde_json::V
 
     notes.iter().for_each(|note| session.console.say(&format!("note: {note}")));
     let (elapsed, score) = (session.console.elapsed(), &texture.document().score);
-    let made_of = match report.bands {
-        0 => "tiles".to_owned(),
-        bands => format!("{bands} bands"),
-    };
+    let made_of = made_of(report.bands);
     session.console.say(&format!(
         "{}  {} bytes, {made_of}, seed {}, fit {:.2} (recommended: {}), {}",
         shown(&request.output),

@@ -98,6 +98,11 @@ fn write(session: &Session, target: &Target, texture: &NoiseTexture, force: bool
     }
 }
 
+/// What a texture consists of, for people: bands, or tiles.
+fn made_of(bands: usize) -> String {
+    if bands == 0 { "tiles".into() } else { format!("{bands} bands") }
+}
+
 /// What a target is called.
 fn shown(target: &Target) -> String {
     match target {

@@ -119,7 +119,7 @@ fn between(a: &Model, b: &Model, t: f64) -> Result<(Model, [Vec<usize>; 2])> {
             bad("noise with directions", "isotropic noise")
         }
         (Model::Tiling { .. }, _) | (_, Model::Tiling { .. }) => {
-            let expected = "noise, as the first must be: only that has numbers to go between";
+            let expected = "noise, as the first: between tiles there is nothing";
             Err(Error::parameter("other", expected, "tiling and blending"))
         }
     }

@@ -48,19 +48,12 @@ pub fn fit(
     window = middle(&window, (height.min(longest), width.min(longest)));
     let shorter = window.height.min(window.width) as u32;
     let across = if options.cell == 0 { (shorter / 5).max(8) } else { options.cell };
-    let across = across.next_multiple_of(2);
-    let cell = [across, (f64::from(across) * 0.75f64.sqrt()).round() as u32];
-    // Sides that can be halved as often as cells ask for.
-    let whole = 1 << halvings(cell);
-    window = middle(&window, (window.height / whole * whole, window.width / whole * whole));
-    let size = [window.width as u32, window.height as u32];
-    if Places::new(size, cell).is_none() {
-        let expected = format!(
-            "at most {} for this photo, half of its shorter side",
-            (shorter / 2).saturating_sub(1 + whole as u32)
-        );
+    let Some((cell, window)) = cells(across, &window) else {
+        let most = (0..shorter / 2).rev().find(|across| cells(*across, &window).is_some());
+        let expected = format!("at most {} for this photo", most.unwrap_or(0));
         return Err(Error::parameter("cell", expected, options.cell));
-    }
+    };
+    let size = [window.width as u32, window.height as u32];
     let planes = analysis.planes(exemplar);
     let channels: Vec<Channel> = analysis
         .channels()
@@ -83,6 +76,16 @@ pub fn fit(
     let deviations: Vec<f64> = channels.iter().map(|channel| channel.weights[0]).collect();
     layout.choose(ctx, &deviations, ctx.seed as u32)?;
     Ok((analysis.with_channels(channels), layout))
+}
+
+/// Cells about `across` pixels wide, and a window whose sides can be halved as often as they ask for;
+/// `None` if that is too small for them.
+fn cells(across: u32, window: &Rect) -> Option<([u32; 2], Rect)> {
+    let across = across.max(2).next_multiple_of(2);
+    let cell = [across, (f64::from(across) * 0.75f64.sqrt()).round() as u32];
+    let whole = 1 << halvings(cell);
+    let window = middle(window, (window.height / whole * whole, window.width / whole * whole));
+    Places::new([window.width as u32, window.height as u32], cell).map(|_| (cell, window))
 }
 
 /// The middle of a rectangle.
