@@ -13,21 +13,13 @@ import texforge
 from PIL import Image
 
 from .noise_exports import ORIENTED, textures
-from .shaders import (
-    compile_glsl,
-    compile_hlsl,
-    compile_wgsl,
-    render_glsl,
-    render_hlsl,
-    render_wgsl,
-)
+from .shaders import EXAMPLES, View, render_example
 
 if TYPE_CHECKING:
     Picture = npt.NDArray[np.float32]
 
 SIZE = (75, 128)
 TARGETS = ["glsl", "glsl-es", "wgsl", "hlsl"]
-EXTENSIONS = {"glsl": "frag", "glsl-es": "frag", "wgsl": "wgsl", "hlsl": "hlsl"}
 NAMES = ["grey", "color", "square", "material", "oriented"]
 VIEWS = {
     "photo": (1.0, (0.0, 0.0)),
@@ -42,46 +34,12 @@ def made() -> dict[str, texforge.NoiseTexture]:
     return textures()
 
 
-def shown(
-    files: dict[str, bytes],
-    target: str,
-    name: str = "granite",
-    *,
-    scale: float = 1,
-    origin: tuple[float, float] = (0, 0),
-    contrast: float = 1,
-    linear_light: bool = False,
-    which: int | None = None,
-) -> Picture:
-    """Render the example of an export; `which` of its outputs, if it has several."""
-    source = files[f"{name}_example.{EXTENSIONS[target]}"].decode()
+def shown(files: dict[str, bytes], target: str, name: str = "granite", **view: Any) -> Picture:
+    """Render the example of an export."""
+    source = files[f"{name}{EXAMPLES[target]}"].decode()
     with Image.open(io.BytesIO(files[f"{name}_tile.png"])) as image:
         tile = np.asarray(image.convert("RGBA"))
-    images = {f"{name}_tile": tile}
-    if target == "wgsl":
-        compile_wgsl(source)
-        fields: list[tuple[Any, ...]] = [
-            ("origin", np.float32, 2),
-            ("scale", np.float32),
-            ("contrast", np.float32),
-            ("linear_light", np.uint32),
-            ("shown", np.uint32),
-        ]
-        view = np.array([(origin, scale, contrast, linear_light, which or 0)], fields)
-        return render_wgsl(source, "example", SIZE, images, {"view": view})
-    uniforms: dict[str, Any] = {
-        "origin": origin,
-        "scale": scale,
-        "contrast": contrast,
-        "linear_light": linear_light,
-    }
-    if which is not None:
-        uniforms["shown"] = which
-    if target == "hlsl":
-        compile_hlsl(source, "example")
-        return render_hlsl(source, "example", SIZE, images, uniforms)
-    compile_glsl(source)
-    return render_glsl(source, SIZE, images, uniforms)
+    return render_example(source, target, SIZE, {f"{name}_tile": tile}, View(**view))
 
 
 def points(scale: float, origin: tuple[float, float]) -> npt.NDArray[np.float64]:

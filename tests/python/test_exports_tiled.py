@@ -9,15 +9,7 @@ import numpy as np
 import pytest
 import texforge
 
-from .shaders import (
-    Filtered,
-    compile_glsl,
-    compile_hlsl,
-    compile_wgsl,
-    render_glsl,
-    render_hlsl,
-    render_wgsl,
-)
+from .shaders import EXAMPLES, Filtered, View, compile_example, render_example
 from .tiled_exports import points, textures
 
 if TYPE_CHECKING:
@@ -27,7 +19,6 @@ if TYPE_CHECKING:
 
 SIZE = (75, 128)
 TARGETS = ["glsl", "glsl-es", "wgsl", "hlsl"]
-EXTENSIONS = {"glsl": "frag", "glsl-es": "frag", "wgsl": "wgsl", "hlsl": "hlsl"}
 VIEWS = {
     "photo": (1.0, (-40.0, -30.0)),
     "magnified": (0.37, (-700.25, 1234.5)),
@@ -72,47 +63,15 @@ def pictures(
 
 
 def shown(
-    files: dict[str, bytes],
-    target: str,
-    folder: Path,
-    *,
-    scale: float = 1,
-    origin: tuple[float, float] = (0, 0),
-    contrast: float = 1,
-    linear_light: bool = False,
-    which: int | None = None,
-    flipped: bool = False,
+    files: dict[str, bytes], target: str, folder: Path, *, flipped: bool = False, **view: Any
 ) -> Picture:
-    """Render the example of an export; `which` of its outputs, if it has several."""
-    source = files[f"stones_example.{EXTENSIONS[target]}"].decode()
+    """Render the example of an export."""
+    source = files[f"stones{EXAMPLES[target]}"].decode()
     images = pictures(files, folder, flipped=flipped)
     if flipped:
         assert "flipped = false" in source
         source = source.replace("flipped = false", "flipped = true")
-    if target == "wgsl":
-        compile_wgsl(source)
-        fields: list[tuple[Any, ...]] = [
-            ("origin", np.float32, 2),
-            ("scale", np.float32),
-            ("contrast", np.float32),
-            ("linear_light", np.uint32),
-            ("shown", np.uint32),
-        ]
-        view = np.array([(origin, scale, contrast, linear_light, which or 0)], fields)
-        return render_wgsl(source, "example", SIZE, images, {"view": view})
-    uniforms: dict[str, Any] = {
-        "origin": origin,
-        "scale": scale,
-        "contrast": contrast,
-        "linear_light": linear_light,
-    }
-    if which is not None:
-        uniforms["shown"] = which
-    if target == "hlsl":
-        compile_hlsl(source, "example")
-        return render_hlsl(source, "example", SIZE, images, uniforms)
-    compile_glsl(source)
-    return render_glsl(source, SIZE, images, uniforms)
+    return render_example(source, target, SIZE, images, View(**view))
 
 
 @pytest.mark.parametrize(("name", "view"), CASES)
@@ -159,14 +118,9 @@ def test_contrast_linear_light_and_flipped_pictures(
 def test_any_name(made: dict[str, texforge.NoiseTexture], target: str) -> None:
     for name in ("table", "input_0", "WIDTH", "log2"):
         files = made["grey"].export(target, name=name)  # type: ignore[arg-type]
-        (example,) = (f for f in files if f.endswith(f"_example.{EXTENSIONS[target]}"))
+        (example,) = (f for f in files if f.endswith(EXAMPLES[target]))
         source = files[example].decode()
-        if target == "wgsl":
-            compile_wgsl(source)
-        elif target == "hlsl":
-            compile_hlsl(source, "example")
-        else:
-            compile_glsl(source)
+        compile_example(source, target)
 
 
 @pytest.mark.parametrize("name", ["grey", "color"])
