@@ -804,6 +804,9 @@ DAMAGE: dict[str, Callable[[dict[str, Any]], object]] = {
     "no maps": changed(("maps",), []),
     "kind": changed(("maps", 0, "kind"), "smell"),
     "encoding": changed(("maps", 0, "encoding"), "gamma"),
+    "two maps of one name": lambda d: d.update(
+        maps=[{**d["maps"][0], "channels": n} for n in (1, 2)]
+    ),
     "no channels": changed(("maps", 0, "channels"), 0),
     "channels overflow": changed(("maps", 0, "channels"), 2**63),
     "more channels": changed(("maps", 0, "channels"), 4),

@@ -293,8 +293,11 @@ impl Document {
                 "its maps have {channels} channels, possible are 1 to {MOST_CHANNELS} in all and 1 at least in each"
             ));
         }
-        for map in &self.maps {
+        for (i, map) in self.maps.iter().enumerate() {
             use crate::base::params::Value;
+            if self.maps[..i].iter().any(|other| other.name == map.name) {
+                return bad(format!("two of its maps are called `{}`", map.name));
+            }
             if MapKind::parse(&map.kind).is_none() {
                 return bad(format!(
                     "the kind of its map `{}` is `{}`, not one of {}",
