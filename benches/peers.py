@@ -414,8 +414,9 @@ def bench_program(cargo: str, name: str) -> str:
     command = [cargo, "bench", "--locked", "--bench", name, "--no-run", "--message-format", "json"]
     said = subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True)
     messages = [json.loads(line) for line in said.stdout.splitlines() if line.startswith("{")]
-    programs = [str(m["executable"]) for m in messages if m.get("executable")]
-    return programs[-1]
+    # The command is built, too.
+    made = [m for m in messages if m.get("executable") and m["target"]["name"] == name]
+    return str(made[-1]["executable"])
 
 
 def target_directory(cargo: str) -> Path:
