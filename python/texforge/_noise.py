@@ -90,8 +90,8 @@ def fit_noise(
         How narrow the borders are where the tiles of tiling blend, 1 to 16: 1 blends all over as
         the paper does, 16 is nearly a cut.
     keep : int
-        Most pixels along each side of the photo's part that tiling keeps, 64 to 8192; the document
-        has about 8 bytes for each of them.
+        Most pixels along each side of the photo's part that tiling keeps, 64 to 8192; a document of
+        colours has about 8 bytes for each pixel of that part.
     seed : int
         Chooses among the textures with the same statistics, 0 to 2**32 - 1.
     mask : (H, W) array_like, or Pillow image, optional

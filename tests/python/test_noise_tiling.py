@@ -236,6 +236,10 @@ REFUSED: dict[str, tuple[type[Exception], Callable[[texforge.NoiseTexture], obje
         ),
     ),
     "a third axis": (texforge.ParameterError, lambda t: t.at([[0.0, 0.0, 0.0]])),
+    "millions of tiles that go round": (
+        texforge.ParameterError,
+        lambda t: t.render(100, tileable=True, scale=1e4),
+    ),
     "a solid": (texforge.ParameterError, lambda t: t.solid(4)),
     "gains": (texforge.ParameterError, lambda t: t.edit(gains=[0.5])),
     "a feature size": (texforge.ParameterError, lambda t: t.edit(feature_size=2.0)),

@@ -117,6 +117,11 @@ impl Evaluator {
         }
     }
 
+    /// Number of tiles that [`Evaluator::periodic`] chooses; 0 for noise.
+    pub fn periodic_tiles(&self, period: [f64; 2]) -> usize {
+        self.tiling.as_ref().map_or(0, |tiling| tiling.count(period))
+    }
+
     /// Steps of progress that [`Evaluator::periodic`] takes.
     pub fn periodic_steps(&self, period: [f64; 2]) -> u64 {
         self.tiling.as_ref().map_or(0, |tiling| tiling.steps(period))

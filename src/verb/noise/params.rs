@@ -61,7 +61,7 @@ params! {
         cell: usize = 0, in 0..=4096;
         /// How narrow the borders are where the tiles of tiling blend: 1 blends all over as the paper does, 16 is nearly a cut.
         sharpness: usize = 4, in 1..=16;
-        /// Most pixels along each side of the photo's part that tiling keeps; the document has about 8 bytes for each of them.
+        /// Most pixels along each side of the photo's part that tiling keeps; a document of colours has about 8 bytes for each pixel of that part.
         keep: usize = 1024, in 64..=8192;
     }
 }

@@ -14,7 +14,8 @@ const IN_ROW: usize = 4;
 
 impl NoiseTexture {
     /// A picture of 8 bits to look at, of the first map: in the first row the photo (its middle, if one is
-    /// given), the texture and the texture four times as large, then each octave of noise alone, the finest first.
+    /// given), the texture and the texture four times as large, then each octave of noise alone, the finest
+    /// first.
     ///
     /// # Errors
     /// [`Error::Memory`](crate::Error::Memory), [`Error::Cancelled`](crate::Error::Cancelled); of a photo

@@ -60,6 +60,9 @@ impl RenderParams {
     }
 }
 
+/// Most tiles that are chosen for a picture that goes round: about a minute.
+const MOST_TILES: usize = 1 << 16;
+
 /// Points that a thread evaluates at a time.
 const CHUNK: usize = 4096;
 
@@ -211,7 +214,7 @@ impl NoiseTexture {
     ///
     /// # Errors
     /// [`Error::Parameter`] for a size of 0 or more than 65536, a scale or an origin out of range, or a
-    /// tileable texture with turned directions; [`Error::Memory`]; [`Error::Cancelled`].
+    /// tileable texture with turned directions or more than 65536 tiles; [`Error::Memory`]; [`Error::Cancelled`].
     pub fn render(&self, ctx: &Ctx, params: &RenderParams) -> Result<Vec<RenderedMap>> {
         let (width, height) = params.size;
         let mut strips = self.strips(ctx, params, width.saturating_mul(height))?;
@@ -247,6 +250,11 @@ impl NoiseTexture {
         let bytes = (width * rows).checked_mul(self.channels() * 8);
         ensure_available("the picture", bytes.map(|n| n as u64))?;
         let period = params.tileable.then(|| [width, height].map(|n| n as f64 * params.scale));
+        let tiles = period.map_or(0, |period| self.evaluator.periodic_tiles(period));
+        if tiles > MOST_TILES {
+            let expected = format!("off for so large a part: at most {MOST_TILES} tiles go round");
+            return Err(Error::parameter("tileable", expected, format!("on with {tiles}")));
+        }
         let steps = period.map_or(0, |period| self.evaluator.periodic_steps(period));
         ctx.begin(height as u64 + steps);
         let texture = match period.filter(|_| steps > 0) {

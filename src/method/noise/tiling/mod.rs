@@ -189,6 +189,11 @@ impl Tiling {
         Ok(Self { lattice, table, ..self.clone() })
     }
 
+    /// Number of tiles that [`Tiling::periodic`] chooses.
+    pub(super) fn count(&self, period: [f64; 2]) -> usize {
+        Lattice::fitting(self.cell, period).len()
+    }
+
     /// Steps of progress that [`Tiling::periodic`] takes.
     pub(super) fn steps(&self, period: [f64; 2]) -> u64 {
         table::steps(&Lattice::fitting(self.cell, period))

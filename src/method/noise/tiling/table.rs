@@ -156,7 +156,7 @@ type Overlap = Vec<([i32; 2], f32)>;
 /// What a neighbour shows at places from a vertex, and their weights.
 type Shown = Vec<([i32; 2], f32, [f32; COMPARED])>;
 
-/// A vertex' neighbour as it lies there: its choice, its way, and which overlap.
+/// A vertex' neighbour: its place in the input, the way to it, and which overlap they share.
 struct Beside {
     place: [i32; 2],
     way: [i32; 2],
