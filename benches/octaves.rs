@@ -50,8 +50,8 @@ fn main() {
     let values = || match what.as_str() {
         "plane" => texture.at(&ctx, &plane, Filter::NONE).unwrap(),
         "space" => texture.solid(&ctx, &space, None, Filter::NONE).unwrap(),
-        _ => match texture.render(&ctx, &params).unwrap().remove(0).2.samples() {
-            Samples::F32(values) => values.clone(),
+        _ => match texture.render(&ctx, &params).unwrap().remove(0).2.into_samples() {
+            Samples::F32(values) => values,
             _ => Vec::new(),
         },
     };

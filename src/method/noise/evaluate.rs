@@ -6,6 +6,7 @@ use pulp::Arch;
 
 use crate::base::ctx::Ctx;
 use crate::base::error::Result;
+use crate::method::noise::colour::Colours;
 use crate::method::noise::document::{Document, Model, Term};
 use crate::method::noise::points::{PlaneNoise, SolidNoise, axes};
 use crate::method::noise::shape::Shape;
@@ -41,8 +42,8 @@ pub struct Evaluator {
     /// Variance of each term's noise at the photo's pixels.
     at_pixels: Vec<f64>,
     pub(super) channels: Vec<ChannelEvaluator>,
-    mean: Vec<f32>,
-    matrix: Vec<Vec<f32>>,
+    pub(super) mean: Vec<f32>,
+    pub(super) matrix: Vec<Vec<f32>>,
     /// Cosine and sine of the directions' angle.
     pub(crate) turn: Option<[f64; 2]>,
 }
@@ -54,7 +55,7 @@ pub(super) struct ChannelEvaluator {
     pub(super) offsets: Vec<[f64; 3]>,
     /// Variance of each band at the photo's pixels, with its weight.
     variances: Vec<f64>,
-    shape: Option<Shape>,
+    pub(super) shape: Option<Shape>,
 }
 
 /// A channel's weights under a filter, and what brings its noise into shape.
@@ -65,7 +66,7 @@ pub(crate) struct Filtered {
     /// From noise to standard deviations; 0 for no noise at all.
     pub(crate) per_deviation: f32,
     /// Standard deviation of what the filter took away, in those of all.
-    lost: f32,
+    pub(super) lost: f32,
     /// Level of a tiled texture's input.
     level: f32,
 }
@@ -207,13 +208,16 @@ impl Evaluator {
     pub fn plane(&self, points: &[[f64; 2]], filter: Filter, out: &mut [f32]) {
         let filtered = self.filtered(filter);
         if let Some(tiling) = &self.tiling {
-            let mut noise = vec![0.0; self.channels.len()];
+            let mut one = vec![0.0; self.channels.len()];
             let mut known = None;
-            for (point, out) in points.iter().zip(out.chunks_exact_mut(self.channels())) {
-                tiling.at(*point, filtered[0].level, &mut known, &mut noise);
-                noise.iter_mut().zip(&filtered).for_each(|(value, f)| *value *= f.weights[0]);
-                self.colour(&filtered, &noise, out);
-            }
+            self.blocks(points, &filtered, out, |_, points, noise| {
+                for (i, point) in points.iter().enumerate() {
+                    tiling.at(*point, filtered[0].level, &mut known, &mut one);
+                    for ((noise, one), f) in noise.iter_mut().zip(&one).zip(&filtered) {
+                        noise[i] = one * f.weights[0];
+                    }
+                }
+            });
             return;
         }
         self.blocks(points, &filtered, out, |_, points, noise| {
@@ -235,18 +239,15 @@ impl Evaluator {
         points: &[P],
         filtered: &[Filtered],
         out: &mut [f32],
-        add_noise: impl Fn(usize, &[P], &mut [[f32; BLOCK]]),
+        mut add_noise: impl FnMut(usize, &[P], &mut [[f32; BLOCK]]),
     ) {
         let mut noise = vec![[0.0; BLOCK]; self.channels.len()];
-        let mut one = vec![0.0; self.channels.len()];
         let blocks = points.chunks(BLOCK).zip(out.chunks_mut(BLOCK * self.channels()));
         for (k, (points, out)) in blocks.enumerate() {
             noise.as_flattened_mut().fill(0.0);
             add_noise(k * BLOCK, points, &mut noise);
-            for (i, out) in out.chunks_exact_mut(self.channels()).enumerate() {
-                one.iter_mut().zip(&noise).for_each(|(one, noise)| *one = noise[i]);
-                self.colour(filtered, &one, out);
-            }
+            let noise = noise.as_flattened_mut();
+            Arch::new().dispatch(Colours { evaluator: self, filtered, noise, out });
         }
     }
 
@@ -281,32 +282,6 @@ impl Evaluator {
             Arch::new().dispatch(block);
         });
     }
-
-    /// The channels of a value of the independent channels' `noise`.
-    #[inline]
-    pub(super) fn colour(&self, filtered: &[Filtered], noise: &[f32], out: &mut [f32]) {
-        out.copy_from_slice(&self.mean);
-        for (c, (&value, f)) in noise.iter().zip(filtered).enumerate() {
-            let shaped = match &self.channels[c].shape {
-                None => value,
-                Some(shape) => shaped(shape, value * f.per_deviation, f.lost),
-            };
-            for (out, row) in out.iter_mut().zip(&self.matrix) {
-                *out += row[c] * shaped;
-            }
-        }
-    }
-}
-
-/// The mean of the shape over what the filter took away, which is normally distributed: by three places
-/// of Gauss-Hermite quadrature.
-#[inline]
-fn shaped(shape: &Shape, u: f32, lost: f32) -> f32 {
-    if lost == 0.0 {
-        return shape.at(u);
-    }
-    let side = 1.732_050_8 * lost;
-    (shape.at(u - side) + shape.at(u + side)) * (1.0 / 6.0) + shape.at(u) * (2.0 / 3.0)
 }
 
 /// Position of `at`, in pixels, on the torus of a band. The middle of the photo's first pixel is a

@@ -4,6 +4,7 @@
 //! [`fit`] and [`oriented`] analyse, [`Document`] is what remains, [`Evaluator`] gives values at points, [`raster`]
 //! pictures.
 
+mod colour;
 pub mod document;
 mod edit;
 pub mod evaluate;

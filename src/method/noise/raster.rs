@@ -3,10 +3,12 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use crate::base::ctx::Ctx;
 use crate::base::error::Result;
+use crate::method::noise::colour::Colours;
 use crate::method::noise::document::{MOST_CHANNELS, Term};
 use crate::method::noise::evaluate::{Evaluator, Filter, position};
 use crate::signal::wavelet_noise::{Row, Torus, hash};
@@ -96,36 +98,47 @@ pub fn render(
         .collect();
     let lines = out.par_chunks_mut(cols * channels).enumerate();
     lines.try_for_each_init(
-        || {
-            (
-                vec![0.0; cols * evaluator.channels.len()],
-                Vec::new(),
-                vec![0.0; evaluator.channels.len()],
-            )
-        },
-        |(noise, combined, one), (y, line)| {
+        || (vec![0.0; cols * evaluator.channels.len()], Vec::new()),
+        |(noise, combined), (y, line)| {
             ctx.step(1)?;
             let y = rows.start + y;
             noise.fill(0.0);
-            for (c, (channel, noise)) in
-                evaluator.channels.iter().zip(noise.chunks_mut(cols)).enumerate()
-            {
-                for (t, &weight) in filtered[c].weights.iter().enumerate() {
-                    let (Some(grid), Some(row)) = (&grids[t], &columns[c][t]) else { continue };
+            let rows = evaluator.channels.iter().zip(&filtered).zip(&columns).enumerate();
+            for ((c, ((channel, f), columns)), noise) in rows.zip(noise.chunks_mut(cols)) {
+                let terms = f.weights.iter().zip(&grids).zip(columns).enumerate();
+                for (t, ((&weight, grid), xs)) in terms {
+                    let (Some(grid), Some(xs)) = (grid, xs) else { continue };
                     let Some(y) = place(at(y, 1), 1, channel.offsets[t][1], t) else { continue };
                     if weight != 0.0 {
-                        grid.tori[c].add_row(row, y, weight, combined, noise);
+                        let torus = &*grid.tori[c];
+                        Arch::new().dispatch(AddRow { torus, xs, y, weight, combined, noise });
                     }
                 }
             }
-            for (x, out) in line.chunks_exact_mut(channels).enumerate() {
-                one.iter_mut().enumerate().for_each(|(c, v)| *v = noise[c * cols + x]);
-                evaluator.colour(&filtered, one, out);
-            }
+            Arch::new().dispatch(Colours { evaluator, filtered: &filtered, noise, out: line });
             Ok(())
         },
     )?;
     Ok(out)
+}
+
+/// A row of noise, with the CPU's widest instructions.
+struct AddRow<'a> {
+    torus: &'a Torus,
+    xs: &'a Row,
+    y: f64,
+    weight: f32,
+    combined: &'a mut Vec<f32>,
+    noise: &'a mut [f32],
+}
+
+impl WithSimd for AddRow<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        self.torus.add_row(self.xs, self.y, self.weight, self.combined, self.noise);
+    }
 }
 
 /// The coefficients of every term; `None` for one too coarse for a texture that goes round.

@@ -1,5 +1,7 @@
 //! [`Shape`]: a channel's histogram as a function of a normally distributed number.
 
+use pulp::Simd;
+
 use crate::signal::normal;
 
 /// Where the knots lie, in standard deviations. Beyond the outermost the value stays.
@@ -47,6 +49,37 @@ impl Shape {
         let [c0, c1, c2, c3, per] = self.pieces[i];
         let t = (u - self.knots[i]) * per;
         c0 + t * (c1 + t * (c2 + t * c3))
+    }
+
+    /// Replaces numbers of standard deviations by their values: the same bits as [`Shape::at`] gives.
+    #[inline(always)]
+    pub(super) fn apply<S: Simd>(&self, simd: S, us: &mut [f32]) {
+        // Every piece is tried in turn, which one lane alone does worse than finding it.
+        let (vectors, rest) =
+            if S::F32_LANES > 1 { S::as_mut_simd_f32s(us) } else { (&mut [][..], us) };
+        let all = |value: f32| simd.splat_f32s(value);
+        let last = KNOTS.len() - 1;
+        for u in vectors {
+            let mut knot = all(self.knots[0]);
+            let mut piece = self.pieces[0].map(all);
+            for i in 1..last {
+                let above = simd.greater_than_or_equal_f32s(*u, all(self.knots[i]));
+                knot = simd.select_f32s(above, all(self.knots[i]), knot);
+                for (c, &next) in piece.iter_mut().zip(&self.pieces[i]) {
+                    *c = simd.select_f32s(above, all(next), *c);
+                }
+            }
+            let [c0, c1, c2, c3, per] = piece;
+            let t = simd.mul_f32s(simd.sub_f32s(*u, knot), per);
+            let value = simd.add_f32s(c2, simd.mul_f32s(t, c3));
+            let value = simd.add_f32s(c1, simd.mul_f32s(t, value));
+            let value = simd.add_f32s(c0, simd.mul_f32s(t, value));
+            let below = simd.less_than_or_equal_f32s(*u, all(self.knots[0]));
+            let value = simd.select_f32s(below, all(self.ends[0]), value);
+            let beyond = simd.greater_than_or_equal_f32s(*u, all(self.knots[last]));
+            *u = simd.select_f32s(beyond, all(self.ends[1]), value);
+        }
+        rest.iter_mut().for_each(|u| *u = self.at(*u));
     }
 
     /// Squares of the coefficients of the 1st, 2nd, ... normalised Hermite polynomial, whose sum is the
@@ -134,6 +167,34 @@ mod tests {
                 let value = shape.at(i as f32 * 0.01);
                 prop_assert!(value >= before - 1e-6, "falls at {i}");
                 before = value;
+            }
+        }
+    }
+
+    struct Apply<'a>(&'a Shape, Vec<f32>);
+
+    impl pulp::WithSimd for Apply<'_> {
+        type Output = Vec<f32>;
+
+        #[inline(always)]
+        fn with_simd<S: Simd>(mut self, simd: S) -> Vec<f32> {
+            self.0.apply(simd, &mut self.1);
+            self.1
+        }
+    }
+
+    #[test]
+    fn many_values_have_the_bits_of_one() {
+        let shape = Shape::new(&KNOTS.map(|u| u + 0.3 * (2.0 * u).sin()));
+        let ends = [f32::NEG_INFINITY, f32::INFINITY, -0.0, 1e-40];
+        let mut us: Vec<f32> = (-4000..=4000).map(|i| i as f32 * 0.001).chain(ends).collect();
+        us.extend(
+            KNOTS.iter().flat_map(|&u| [u as f32, (u as f32).next_up(), (u as f32).next_down()]),
+        );
+        for arch in [pulp::Arch::new(), pulp::Arch::Scalar] {
+            let values = arch.dispatch(Apply(&shape, us.clone()));
+            for (&u, value) in us.iter().zip(values) {
+                assert_eq!(value.to_bits(), shape.at(u).to_bits(), "{u}");
             }
         }
     }

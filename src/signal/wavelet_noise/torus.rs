@@ -26,31 +26,51 @@ pub struct Row {
     /// The coefficients that any position needs: the first, and how many, round the torus.
     start: usize,
     span: usize,
-    /// The first of each position's three, counted from `start`.
-    first: Vec<u32>,
-    weights: [Vec<f32>; 3],
+    /// The last one may go on with positions at `start` that count for nothing.
+    blocks: Vec<RowBlock>,
+}
+
+/// Positions of a [`Row`] that are worked on at a time.
+#[derive(Debug, Clone, Default)]
+struct RowBlock {
+    /// The first of each position's three coefficients, counted from the row's start.
+    first: [u32; AT_ONCE],
+    weights: [[f32; AT_ONCE]; 3],
+}
+
+const AT_ONCE: usize = 8;
+
+impl RowBlock {
+    /// Weighted sums of coefficients, from the row's start.
+    #[inline(always)]
+    fn sums(&self, coefficients: &[f32]) -> [f32; AT_ONCE] {
+        // Gathered first, so that the sums are made for all at once.
+        let mut values = [[0.0; AT_ONCE]; 3];
+        for (i, &first) in self.first.iter().enumerate() {
+            let three = &coefficients[first as usize..][..3];
+            (0..3).for_each(|k| values[k][i] = three[k]);
+        }
+        let ([v0, v1, v2], [w0, w1, w2]) = (&values, &self.weights);
+        std::array::from_fn(|i| (w0[i] * v0[i] + w1[i] * v1[i]) + w2[i] * v2[i])
+    }
 }
 
 impl Row {
     /// Of these positions, on a torus of `n` coefficients.
     pub fn new(positions: impl Iterator<Item = f64>, n: usize) -> Self {
-        let mut row = Self::default();
-        let mut firsts = Vec::new();
-        for position in positions {
-            let (first, weights) = spline_weights(position);
-            firsts.push(first);
-            for (all, w) in row.weights.iter_mut().zip(weights) {
-                all.push(w);
-            }
-        }
+        let (firsts, weights): (Vec<f64>, Vec<[f32; 3]>) = positions.map(spline_weights).unzip();
         let (Some(&least), Some(&most)) = (firsts.first(), firsts.last()) else {
-            return row;
+            return Self::default();
         };
+        let mut blocks = vec![RowBlock::default(); firsts.len().div_ceil(AT_ONCE)];
+        for (i, (first, weights)) in firsts.into_iter().zip(weights).enumerate() {
+            let (block, i) = (&mut blocks[i / AT_ONCE], i % AT_ONCE);
+            block.first[i] = wrapped(first - least, n);
+            (0..3).for_each(|k| block.weights[k][i] = weights[k]);
+        }
         // All of them at most, and two again so that three always follow each other.
-        row.span = (most - least + 3.0).min((n + 2) as f64) as usize;
-        row.start = wrapped(least, n) as usize;
-        row.first = firsts.into_iter().map(|first| wrapped(first - least, n)).collect();
-        row
+        let span = (most - least + 3.0).min((n + 2) as f64) as usize;
+        Self { start: wrapped(least, n) as usize, span, blocks }
     }
 }
 
@@ -166,6 +186,7 @@ impl Torus {
 
     /// Adds `weight` times the noise at the positions of `xs` and height `y` to `sums`: the same bits as
     /// [`Torus::at`] gives. `combined` is scratch space.
+    #[inline(always)]
     pub fn add_row(
         &self,
         xs: &Row,
@@ -186,11 +207,14 @@ impl Torus {
             combined.extend(columns.map(|((a, b), c)| (wy[0] * a + wy[1] * b) + wy[2] * c));
             at = 0;
         }
-        let [w0, w1, w2] = &xs.weights;
-        let positions = xs.first.iter().zip(w0.iter().zip(w1).zip(w2));
-        for (sum, (&first, ((w0, w1), w2))) in sums.iter_mut().zip(positions) {
-            let v = &combined[first as usize..][..3];
-            *sum += weight * ((w0 * v[0] + w1 * v[1]) + w2 * v[2]);
+        let (blocks, rest) = sums.as_chunks_mut::<AT_ONCE>();
+        let (whole, last) = xs.blocks.split_at(blocks.len().min(xs.blocks.len()));
+        let add = |(sum, value): (&mut f32, f32)| *sum += weight * value;
+        for (sums, block) in blocks.iter_mut().zip(whole) {
+            sums.iter_mut().zip(block.sums(combined)).for_each(add);
+        }
+        for block in last.iter().take(1) {
+            rest.iter_mut().zip(block.sums(combined)).for_each(add);
         }
     }
 }

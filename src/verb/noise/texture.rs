@@ -287,48 +287,60 @@ impl NoiseTexture {
         let filter =
             Filter { footprint: footprint(params.scale), keep_contrast: params.keep_contrast };
         let size = (rows.len(), width);
-        let values = ctx.install(|| raster::render(ctx, &self.evaluator, &view, rows, filter))?;
+        let mut values =
+            ctx.install(|| raster::render(ctx, &self.evaluator, &view, rows, filter))?;
         let mut first = 0;
         let maps = self.document().maps.iter().map(|map| {
-            let (from, kind) = (first, MapKind::parse(&map.kind).unwrap_or(MapKind::Data));
+            let kind = MapKind::parse(&map.kind).unwrap_or(MapKind::Data);
+            let range = first..first + map.channels;
             first += map.channels;
-            let picture = self.picture(&values, from, map, kind, (size, params.samples))?;
+            let picture = ctx.install(|| {
+                let pixels = if range.len() == self.channels() {
+                    std::mem::take(&mut values)
+                } else {
+                    gathered(&values, self.channels(), range)
+                };
+                picture(pixels, map, kind, size, params.samples)
+            })?;
             Ok((map.name.clone(), kind, picture))
         });
         maps.collect()
     }
+}
 
-    /// The channels of one map as a picture.
-    fn picture(
-        &self,
-        values: &[f32],
-        first: usize,
-        map: &MapSpec,
-        kind: MapKind,
-        ((height, width), samples): ((usize, usize), SampleType),
-    ) -> Result<Picture> {
-        let pixels =
-            values.chunks_exact(self.channels()).flat_map(|v| &v[first..first + map.channels]);
-        let mut pixels: Vec<f32> = pixels.copied().collect();
-        if kind.is_normal() && map.channels == 3 {
-            pixels.chunks_exact_mut(3).for_each(upright);
-        }
-        let samples = match samples {
-            SampleType::U8 => {
-                Samples::U8(pixels.iter().map(|&v| u8::from_unit(f64::from(v))).collect())
-            }
-            SampleType::U16 => {
-                Samples::U16(pixels.iter().map(|&v| u16::from_unit(f64::from(v))).collect())
-            }
-            SampleType::F32 => Samples::F32(pixels),
-        };
-        let encoding = match map.encoding.as_str() {
-            "srgb" => Encoding::Srgb,
-            "linear" => Encoding::Linear,
-            _ => Encoding::Data,
-        };
-        Picture::new(height, width, map.channels, samples, encoding)
+/// A range of all pixels' channels.
+fn gathered(values: &[f32], channels: usize, range: Range<usize>) -> Vec<f32> {
+    let mut out = vec![0.0; values.len() / channels * range.len()];
+    let pixels = out.par_chunks_exact_mut(range.len()).zip(values.par_chunks_exact(channels));
+    pixels.for_each(|(out, values)| out.copy_from_slice(&values[range.clone()]));
+    out
+}
+
+/// The pixels of a map as a picture.
+fn picture(
+    mut pixels: Vec<f32>,
+    map: &MapSpec,
+    kind: MapKind,
+    (height, width): (usize, usize),
+    samples: SampleType,
+) -> Result<Picture> {
+    if kind.is_normal() && map.channels == 3 {
+        pixels.par_chunks_exact_mut(3).for_each(upright);
     }
+    let unit = |v: &f32| f64::from(*v);
+    let samples = match samples {
+        SampleType::U8 => Samples::U8(pixels.par_iter().map(|v| u8::from_unit(unit(v))).collect()),
+        SampleType::U16 => {
+            Samples::U16(pixels.par_iter().map(|v| u16::from_unit(unit(v))).collect())
+        }
+        SampleType::F32 => Samples::F32(pixels),
+    };
+    let encoding = match map.encoding.as_str() {
+        "srgb" => Encoding::Srgb,
+        "linear" => Encoding::Linear,
+        _ => Encoding::Data,
+    };
+    Picture::new(height, width, map.channels, samples, encoding)
 }
 
 /// A normal stored as `(n + 1) / 2`, brought to unit length.
