@@ -66,8 +66,7 @@ pub fn mean_nearest(
     let Sampling { patch, samples, wrap } = sampling;
     let model = ColorModel::new(photo);
     let colors = |picture: &Picture| {
-        let mut pixels = model.averaging_pixels(picture);
-        pixels.par_chunks_mut(1024).for_each(|row| model.space().convert_row(row));
+        let pixels = model.matching_pixels(picture);
         Colors { pixels, height: picture.height(), width: picture.width() }
     };
     let photo = colors(photo);

@@ -25,6 +25,17 @@ static LAB_CURVE: LazyLock<Vec<f32>> = LazyLock::new(|| {
     (0..=ROOT_STEPS + 1).map(|i| lab_curve_exact(i as f32 / ROOT_STEPS as f32)).collect()
 });
 
+/// Values of all integer samples, as they are and from sRGB to linear light.
+static LINEAR_OF_U8: LazyLock<[Vec<f32>; 2]> = LazyLock::new(|| linear_of(255));
+static LINEAR_OF_U16: LazyLock<[Vec<f32>; 2]> = LazyLock::new(|| linear_of(65535));
+
+fn linear_of(largest: usize) -> [Vec<f32>; 2] {
+    let table = |linear: fn(f64) -> f64| {
+        (0..=largest).map(|i| linear(i as f64 / largest as f64) as f32).collect()
+    };
+    [table(|v| v), table(linear_from_srgb)]
+}
+
 fn lab_curve_exact(t: f32) -> f32 {
     if t > 216.0 / 24389.0 { libm::cbrtf(t) } else { (t * (24389.0 / 27.0) + 16.0) / 116.0 }
 }
@@ -88,7 +99,7 @@ pub struct ColorModel {
     encoding: Encoding,
     components: Option<Components>,
     /// Linear value of every integer sample; empty for floats.
-    table: Vec<f32>,
+    table: &'static [f32],
 }
 
 impl ColorModel {
@@ -97,20 +108,18 @@ impl ColorModel {
         let encoding = photo.encoding;
         let is_color = encoding != Encoding::Data && photo.channels() <= 4;
         let many = !is_color && photo.channels() > 3;
-        let n_values = match photo.samples() {
-            Samples::U8(_) => 256,
-            Samples::U16(_) => 65536,
-            _ => 0,
+        let srgb = encoding == Encoding::Srgb;
+        let table: &[f32] = match photo.samples() {
+            Samples::U8(_) => &LINEAR_OF_U8[usize::from(srgb)],
+            Samples::U16(_) => &LINEAR_OF_U16[usize::from(srgb)],
+            _ => &[],
         };
-        let mut model = Self {
+        Self {
             space: if is_color { MatchSpace::Lab } else { MatchSpace::Data },
             encoding,
             components: many.then(|| Components::of(photo)),
-            table: Vec::new(),
-        };
-        let value = |i: usize| model.linear(i as f64 / (n_values - 1) as f64) as f32;
-        model.table = (0..n_values).map(value).collect();
-        model
+            table,
+        }
     }
 
     /// How averages become colours to match.
@@ -130,6 +139,13 @@ impl ColorModel {
                 .map(|px| self.averaging(c, |k| px[k].to_unit()))
                 .collect()),
         }
+    }
+
+    /// The colours to match.
+    pub fn matching_pixels(&self, picture: &Picture) -> Vec<[f32; 3]> {
+        let mut pixels = self.averaging_pixels(picture);
+        pixels.par_chunks_mut(picture.width()).for_each(|row| self.space.convert_row(row));
+        pixels
     }
 
     /// The colour to match of pixel `i`.

@@ -1,5 +1,7 @@
 //! [`SourceMap`]: for every output pixel the source pixel it is a copy of.
 
+use rayon::prelude::*;
+
 use crate::base::error::{Error, Result};
 use crate::image::material::MapKind;
 use crate::image::normals::{renormalize, turn_normals};
@@ -64,16 +66,16 @@ impl SourceMap {
             return bad(format!("{} origins for {} positions", origins.len(), yx.len()));
         }
         let map = Self { height, width, sources, yx, origins };
-        for (i, &[y, x]) in map.yx.iter().enumerate() {
-            let photo = usize::from(map.origin(i).photo);
-            let Some(&(h, w)) = map.sources.get(photo) else {
-                return bad(format!("photo {} of {} is not there", photo + 1, map.sources.len()));
+        let source = |i: usize| map.sources.get(usize::from(map.origin(i).photo)).copied();
+        let outside = |(i, &[y, x]): (usize, &[u32; 2])| {
+            source(i).is_none_or(|(h, w)| y as usize >= h || x as usize >= w)
+        };
+        if let Some((i, [y, x])) = map.yx.par_iter().enumerate().find_first(|&at| outside(at)) {
+            let photo = usize::from(map.origin(i).photo) + 1;
+            let Some((h, w)) = source(i) else {
+                return bad(format!("photo {photo} of {} is not there", map.sources.len()));
             };
-            if y as usize >= h || x as usize >= w {
-                return bad(format!(
-                    "position row {y}, column {x} lies outside its {w}x{h} source"
-                ));
-            }
+            return bad(format!("position row {y}, column {x} lies outside its {w}x{h} source"));
         }
         Ok(map)
     }
@@ -188,24 +190,25 @@ fn gathered<T: Sample>(source_map: &SourceMap, first: &[T], maps: &[&Picture]) -
     let slices: Vec<&[T]> = maps.iter().map(|m| T::slice(m.samples()).unwrap_or(first)).collect();
     let same_size = |(m, &size): (&&Picture, &(usize, usize))| (m.height(), m.width()) == size;
     let same_size: Vec<bool> = maps.iter().zip(&source_map.sources).map(same_size).collect();
-    let mut out = Vec::with_capacity(source_map.yx.len() * c);
-    for (i, &[y, x]) in source_map.yx.iter().enumerate() {
+    let mut out = vec![T::from_unit(0.0); source_map.yx.len() * c];
+    let pixels = out.par_chunks_exact_mut(c).zip(&source_map.yx).enumerate();
+    pixels.for_each(|(i, (out, &[y, x]))| {
         let photo = usize::from(source_map.origin(i).photo);
         let (v, w) = (slices[photo], maps[photo].width());
         if same_size[photo] {
             let at = (y as usize * w + x as usize) * c;
-            out.extend_from_slice(&v[at..at + c]);
+            out.copy_from_slice(&v[at..at + c]);
         } else {
             let size = (maps[photo].height(), w, c);
-            push_bilinear(&mut out, v, size, (y, x), source_map.sources[photo]);
+            read_bilinear(out, v, size, (y, x), source_map.sources[photo]);
         }
-    }
+    });
     T::wrap(out)
 }
 
 /// Reads a map at the place that corresponds to a pixel of its source.
-fn push_bilinear<T: Sample>(
-    out: &mut Vec<T>,
+fn read_bilinear<T: Sample>(
+    out: &mut [T],
     v: &[T],
     (h, w, c): (usize, usize, usize),
     (y, x): (u32, u32),
@@ -219,10 +222,10 @@ fn push_bilinear<T: Sample>(
     };
     let (y0, y1, fy) = place(y, h, sh);
     let (x0, x1, fx) = place(x, w, sw);
-    for k in 0..c {
+    for (k, out) in out.iter_mut().enumerate() {
         let at = |y: usize, x: usize| v[(y * w + x) * c + k].to_unit();
         let top = at(y0, x0) * (1.0 - fx) + at(y0, x1) * fx;
         let bottom = at(y1, x0) * (1.0 - fx) + at(y1, x1) * fx;
-        out.push(T::from_unit(top * (1.0 - fy) + bottom * fy));
+        *out = T::from_unit(top * (1.0 - fy) + bottom * fy);
     }
 }

@@ -64,7 +64,7 @@ pub fn pass(
     search: Search,
     field: &mut Field,
 ) -> Result<()> {
-    let mut next = field.pos.clone();
+    let mut next: Vec<Pos> = field.pos.par_iter().copied().collect();
     let band = Band { target, source, place_cost, wrap, search, field, seed: ctx.seed };
     // Every other pair of passes the bands are shifted by half: no row is always at an edge.
     let head = if search.pass % 4 < 2 { 0 } else { (BAND / 2).min(field.height) };
@@ -115,8 +115,8 @@ impl Band<'_> {
         let d: isize = if backward { -1 } else { 1 };
         let radii = self.radii();
         let mut query = kernel.query();
-        let mut candidates = [Pos::new(0, 0); 3 + MAX_RANDOM];
-        let mut distances = [0; 3 + MAX_RANDOM];
+        let mut candidates = [Pos::new(0, 0); 3];
+        let mut distances = [0; 3];
         // The distances of the matches in the row that the scan has just left.
         let mut row_distances = vec![0; width];
         let mut random = vec![Pos::new(0, 0); width * radii.len()];
@@ -160,10 +160,6 @@ impl Band<'_> {
                 beside.and_then(|p| p.shifted(0, d, self.source)).map(&mut add);
                 let above = above.as_ref().and_then(|row| row[x].shifted(d, 0, self.source));
                 let known = above.map(|pos| (add(pos), pos)).filter(|_| step > 0);
-                for &pos in &random[x * radii.len()..][..radii.len()] {
-                    candidates[n] = pos;
-                    n += 1;
-                }
                 // A match that moved by a row along with its pixel has lost one row of differences
                 // and won another: no need to sum the others again.
                 let known = known.map_or(usize::MAX, |(i, pos)| {
@@ -186,9 +182,23 @@ impl Band<'_> {
                     let score = self.score(candidate, distances[i]);
                     best = best.min((i64::from(score) << 8) | i as i64);
                 }
-                let best = (best & 0xff) as usize;
-                row[x] = candidates[best];
-                row_distances[x] = distances[best];
+                let i = (best & 0xff) as usize;
+                let (mut best, mut found, mut distance) =
+                    ((best >> 8) as i32, candidates[i], distances[i]);
+                // Most random ones are much worse, which a part of the patch shows.
+                for &pos in &random[x * radii.len()..][..radii.len()] {
+                    if !self.source.is_usable(pos) {
+                        continue;
+                    }
+                    let limit = best - self.place_cost.of(pos);
+                    let image = &self.source.image;
+                    let other = kernel.distance_below(&query, image, self.source.at(pos), limit);
+                    if other < limit {
+                        (best, found, distance) = (best - limit + other, pos, other);
+                    }
+                }
+                row[x] = found;
+                row_distances[x] = distance;
                 beside = Some(row[x]);
             }
             ctx.step(width as u64)?;

@@ -55,10 +55,19 @@ impl PlaceCost {
         let mut usage = Self::free(source);
         let (shift, n) = (usage.shift, source.patch);
         let (cols, rows) = (usage.cols, (source.rows() >> shift) + 1);
-        let mut count = vec![0u32; rows * cols];
-        for pos in &field.pos {
-            count[(pos.y() >> shift) * cols + (pos.x() >> shift)] += 1;
-        }
+        let cell = |pos: &Pos| (pos.y() >> shift) * cols + (pos.x() >> shift);
+        let counts = |some: &[Pos]| {
+            let mut count = vec![0u32; rows * cols];
+            some.iter().for_each(|pos| count[cell(pos)] += 1);
+            count
+        };
+        // A part for every thread: whole numbers have the same sum in any order.
+        let part = field.pos.len().div_ceil(rayon::current_num_threads()).max(1);
+        let count = field.pos.par_chunks(part).map(counts).reduce_with(|mut a, b| {
+            a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
+            a
+        });
+        let count = count.unwrap_or_else(|| counts(&[]));
         // The box of "covers the pixel" and the box of "averaged over the patch" make a tent.
         let reach = (n >> shift).max(1);
         let tent = |v: &[f32], out: &mut [f32]| {

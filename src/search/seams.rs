@@ -44,11 +44,14 @@ pub struct Canvas<'a> {
 /// [`Error::Cancelled`](crate::Error::Cancelled).
 pub fn settle(ctx: &Ctx, canvas: &Canvas<'_>, from: &mut [From], sweeps: u32) -> Result<()> {
     let (h, w) = (canvas.target.height(), canvas.target.width());
-    let mut next = from.to_vec();
+    let mut other = vec![[0; 2]; from.len()];
+    let (mut from, mut next) = (from, &mut other[..]);
+    // An even number of times back and forth.
     for sweep in 0..2 * sweeps {
         next.par_chunks_mut(w).enumerate().try_for_each(|(y, row)| {
             let line = |d: isize| neighbor(y, d, h, canvas.wrap.y).map(|y| &from[y * w..][..w]);
             let (above, own, below) = (line(-1), &from[y * w..][..w], line(1));
+            row.copy_from_slice(own);
             let inside = |x: usize| {
                 let [sy, sx] = own[x];
                 let is = |line: Option<&[From]>, dy: u32| {
@@ -67,7 +70,7 @@ pub fn settle(ctx: &Ctx, canvas: &Canvas<'_>, from: &mut [From], sweeps: u32) ->
             }
             ctx.step(0)
         })?;
-        from.copy_from_slice(&next);
+        std::mem::swap(&mut from, &mut next);
     }
     Ok(())
 }

@@ -1,7 +1,5 @@
 //! [`detect_lattice`]: by which displacements a near-regular photo repeats.
 
-use rayon::prelude::*;
-
 use crate::analyze::lattice::snap::{self, MOST_SCALING, Rows, Snap};
 use crate::analyze::lattice::{self, reduced_size};
 use crate::base::ctx::Ctx;
@@ -193,9 +191,7 @@ fn prepared(photo: &Picture, usable: Option<&Mask>) -> Result<(Vec<[f32; 3]>, Op
     // Colours and their mask; planes, spectra and maps of the reduced photo.
     let pixels = (width * height) as u64;
     ensure_available("the lattice", Some(16 * pixels + 600 * pixels.min(1 << 20)))?;
-    let model = ColorModel::new(photo);
-    let mut colors = model.averaging_pixels(photo);
-    colors.par_chunks_mut(width).for_each(|row| model.space().convert_row(row));
+    let colors = ColorModel::new(photo).matching_pixels(photo);
     let mask = usable.cloned().or_else(|| Mask::from_alpha(photo));
     let mut usable = (0..colors.len()).filter(|&i| mask.as_ref().is_none_or(|m| m.usable()[i]));
     let first = usable.next();

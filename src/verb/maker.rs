@@ -475,8 +475,7 @@ fn costs(
 /// A tile's pixels in the space in which its photo is matched (L*a*b* for colours), and its domain.
 pub(super) fn colors(photo: &Picture, tile: &Picture, wrap: Wrap) -> (Vec<[f32; 3]>, Domain) {
     let model = ColorModel::new(photo);
-    let mut pixels = model.averaging_pixels(tile);
-    model.space().convert_row(&mut pixels);
+    let pixels = model.matching_pixels(tile);
     let (height, width) = (tile.height(), tile.width());
     (pixels, Domain { height, width, wrap_y: wrap.y, wrap_x: wrap.x })
 }

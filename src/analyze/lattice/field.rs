@@ -116,9 +116,9 @@ impl Field {
 
     /// Both, between displacements (linear); `covers` must hold.
     pub(super) fn sample(&self, [x, y]: [f64; 2]) -> (f64, f64) {
-        let (y0, x0) = (y.floor(), x.floor());
-        let (fy, fx) = (y - y0, x - x0);
-        let i = self.index(y0 as isize, x0 as isize);
+        let (y0, x0) = (floor(y), floor(x));
+        let (fy, fx) = (y - y0 as f64, x - x0 as f64);
+        let i = self.index(y0, x0);
         let stride = 2 * self.reach[1] + 1;
         let between = |plane: &[f32]| {
             let at = |i: usize| f64::from(plane[i]);
@@ -192,7 +192,7 @@ impl Plane {
 /// The largest whole number that is not above `v`. Without the call that `f64::floor` is where the
 /// processor is not known.
 #[inline]
-fn floor(v: f64) -> isize {
+pub(super) fn floor(v: f64) -> isize {
     let toward_zero = v as isize;
     toward_zero - isize::from(toward_zero as f64 > v)
 }

@@ -1,7 +1,12 @@
 //! Pairs of displacements, and how well a picture repeats by them.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+use rayon::prelude::*;
+
 use super::Candidate;
-use super::field::Field;
+use super::field::{Field, floor};
 use crate::signal::basis::{Basis, Vector, area, combined, directed, dot};
 
 /// Preference for small cells among equally good ones. The paper's.
@@ -45,33 +50,58 @@ pub(super) fn best(field: &Field, shortest: f64) -> Vec<Candidate> {
 
 /// With `prune`, a pair is given up once it cannot be among the finalists any more.
 fn search(field: &Field, shortest: f64, prune: bool) -> Vec<Candidate> {
-    let peaks = peaks(field, shortest.max(SHORTEST));
-    let bounds = bounds(field, shortest.max(SHORTEST));
-    let mut finalists: Vec<Candidate> = Vec::new();
-    for (i, &v1) in peaks.iter().enumerate() {
-        let mut seconds: Vec<Vector> =
-            peaks[i + 1..].iter().filter_map(|&v2| second(v1, v2)).collect();
-        let key = |v: &Vector| (v[0].round() as i64, v[1].round() as i64);
-        seconds.sort_by(|a, b| {
-            key(a).cmp(&key(b)).then(a[0].total_cmp(&b[0])).then(a[1].total_cmp(&b[1]))
-        });
-        seconds.dedup_by_key(|v| key(v));
-        for v2 in seconds {
-            let worst = finalists.last().filter(|_| prune && finalists.len() == FINALISTS);
-            let prune = worst.map(|worst| Prune { bounds, least: worst.goodness });
-            if let Some(candidate) = goodness(field, [v1, v2], prune) {
-                let at = finalists.partition_point(|c| c.goodness >= candidate.goodness);
-                finalists.insert(at, candidate);
-                finalists.truncate(FINALISTS);
+    let shortest = shortest.max(SHORTEST);
+    let peaks = peaks(field, shortest);
+    let prune = prune.then(|| Prune::new(field, shortest));
+    // What is given up depends on which pairs were looked at before, and so on the threads; the finalists
+    // do not.
+    let with = |i: usize| {
+        let v1 = peaks[i];
+        let mut scratch = Vec::new();
+        let mut found = Vec::new();
+        for v2 in seconds(v1, &peaks[i + 1..]) {
+            if let Some(candidate) = goodness(field, [v1, v2], prune.as_ref(), &mut scratch) {
+                insert(&mut found, candidate);
             }
         }
-    }
+        found
+    };
+    let found: Vec<Vec<Candidate>> = (0..peaks.len()).into_par_iter().map(with).collect();
+    let mut finalists = Vec::new();
+    found.into_iter().flatten().for_each(|candidate| insert(&mut finalists, candidate));
     finalists
+}
+
+/// Inserts a candidate after those that are as good, if it is among the best.
+fn insert(finalists: &mut Vec<Candidate>, candidate: Candidate) {
+    let at = finalists.partition_point(|c| c.goodness >= candidate.goodness);
+    if at < FINALISTS {
+        finalists.insert(at, candidate);
+        finalists.truncate(FINALISTS);
+    }
+}
+
+/// What `peaks` may be beside `v1`, one for each pixel, row by row.
+fn seconds(v1: Vector, peaks: &[Vector]) -> impl Iterator<Item = Vector> {
+    let keyed = |v: Vector| (v.map(|c| nearest(c) as i32), v);
+    let mut all: Vec<_> = peaks.iter().filter_map(|&v2| second(v1, v2)).map(keyed).collect();
+    all.sort_unstable_by(|(key_a, a), (key_b, b)| {
+        key_a.cmp(key_b).then(a[0].total_cmp(&b[0])).then(a[1].total_cmp(&b[1]))
+    });
+    all.dedup_by_key(|(key, _)| *key);
+    all.into_iter().map(|(_, v)| v)
+}
+
+/// The nearest whole number, halves away from 0. Without the call that `f64::round` is where the processor is
+/// not known.
+#[inline]
+fn nearest(v: f64) -> f64 {
+    (v + 0.5f64.copysign(v)) as i64 as f64
 }
 
 /// `v2` less the multiple of `v1` that is nearest to it; `None` if it is then the shorter one.
 fn second(v1: Vector, v2: Vector) -> Option<Vector> {
-    let times = (dot(v1, v2) / dot(v1, v1)).round();
+    let times = nearest(dot(v1, v2) / dot(v1, v1));
     let v2 = directed([v2[0] - times * v1[0], v2[1] - times * v1[1]]);
     // Peaks are as exact as a tenth of a pixel; of equally long ones neither is the shorter.
     (dot(v2, v2) >= 0.98 * dot(v1, v1)).then_some(v2)
@@ -141,37 +171,86 @@ fn bounds(field: &Field, shortest: f64) -> [f64; 2] {
     highest
 }
 
-/// The multiples of a basis that count: their coefficients and displacements, of one half-plane.
-pub(super) fn multiples(field: &Field, basis: Basis) -> Vec<([f64; 2], Vector)> {
+/// Calls `each` with the multiples of a basis that count, of one half-plane: their coefficients, displacements
+/// and overlaps.
+pub(super) fn multiples(field: &Field, basis: Basis, mut each: impl FnMut([f64; 2], Vector, f64)) {
     let [v1, v2] = basis;
     let cell = area(basis);
     let distance = DISTANCE * cell.sqrt();
     let length = dot(v1, v1).sqrt();
     // Rows of multiples of v1, `cell / length` apart.
     let rows = (distance * length / cell) as i32;
-    let mut found = Vec::new();
+    let slant = dot(v1, v2) / (length * length);
     for b in 0..=rows {
         let b = f64::from(b);
-        let middle = -b * dot(v1, v2) / (length * length);
+        let middle = -b * slant;
         let half = (distance * distance - (b * cell / length).powi(2)).max(0.0).sqrt() / length;
-        let first = if b == 0.0 { 1 } else { (middle - half).ceil() as i32 };
-        for a in first..=(middle + half).floor() as i32 {
-            let a = f64::from(a);
+        let first = if b == 0.0 { 1 } else { -floor(half - middle) };
+        for a in first..=floor(middle + half) {
+            let a = a as f64;
             let v = combined(basis, a, b);
-            if field.covers(v) && field.overlap(v) >= OVERLAP {
-                found.push(([a, b], v));
+            let overlap = field.overlap(v);
+            if overlap >= OVERLAP && field.covers(v) {
+                each([a, b], v, overlap);
             }
         }
     }
-    found
 }
 
-/// When to give a pair up: no multiple has more excess and correlation than `bounds`, and a goodness
-/// below `least` is of no use.
-#[derive(Debug, Clone, Copy)]
+/// When to give a pair up: no multiple has more excess and correlation than there is anywhere, and enough
+/// better pairs are known.
 pub(super) struct Prune {
+    /// The most excess and correlation.
     bounds: [f64; 2],
-    least: f64,
+    /// The goodnesses of the best pairs yet, best first.
+    best: Mutex<Vec<f64>>,
+    /// Bits of [`Prune::strength_of`] the last of them.
+    needed: AtomicU64,
+    /// What [`Prune::needed`] multiplies that with, by the highest bits of a cell's area.
+    by_area: Vec<f64>,
+}
+
+impl Prune {
+    /// Of areas [`Prune::by_area`] looks at so many bits: exponent, and five of the mantissa.
+    const SHIFT: u32 = 47;
+
+    fn new(field: &Field, shortest: f64) -> Self {
+        let pixels = field.size[0] * field.size[1];
+        let steps = Self::step(SMALLEST_AREA)..=Self::step(pixels.max(SMALLEST_AREA));
+        // That of the smallest cell of a step, as it falls with the number of cells.
+        let factor = |step: u64| {
+            let cells = pixels / f64::from_bits(step << Self::SHIFT);
+            libm::pow(cells, -(ALPHA - 1.0) * 0.5 / ALPHA) * (1.0 - 1e-9)
+        };
+        Self {
+            bounds: bounds(field, shortest),
+            best: Mutex::default(),
+            needed: AtomicU64::new(0f64.to_bits()),
+            by_area: steps.map(factor).collect(),
+        }
+    }
+
+    fn step(area: f64) -> u64 {
+        area.to_bits() >> Self::SHIFT
+    }
+
+    /// Takes the goodness of a pair into account.
+    fn note(&self, goodness: f64) {
+        let mut best = self.best.lock().unwrap_or_else(PoisonError::into_inner);
+        let at = best.partition_point(|&other| other >= goodness);
+        best.insert(at, goodness);
+        best.truncate(FINALISTS);
+        if best.len() == FINALISTS {
+            let needed = libm::pow(best[FINALISTS - 1], 0.5 / ALPHA);
+            self.needed.store(needed.to_bits(), Ordering::Relaxed);
+        }
+    }
+
+    /// The strength that a pair of this cell needs; a little less, so that rounding gives nothing up.
+    fn needed(&self, cell: f64) -> f64 {
+        let step = Self::step(cell) - Self::step(SMALLEST_AREA);
+        f64::from_bits(self.needed.load(Ordering::Relaxed)) * self.by_area[step as usize]
+    }
 }
 
 /// How well the picture repeats by a basis; `None` if it does not, or was given up.
@@ -189,7 +268,12 @@ pub(super) struct Prune {
 /// # Pruning
 /// The multiples not yet looked at cannot add more than `bounds`; the standard error only lowers.
 /// So a pair is given up only if it would not be among the finalists.
-pub(super) fn goodness(field: &Field, basis: Basis, prune: Option<Prune>) -> Option<Candidate> {
+pub(super) fn goodness(
+    field: &Field,
+    basis: Basis,
+    prune: Option<&Prune>,
+    scratch: &mut Vec<(Vector, f64)>,
+) -> Option<Candidate> {
     let cell = area(basis);
     let cells = field.size[0] * field.size[1] / cell;
     let long =
@@ -197,22 +281,22 @@ pub(super) fn goodness(field: &Field, basis: Basis, prune: Option<Prune>) -> Opt
     if cell < SMALLEST_AREA || cells < CELLS || basis.into_iter().any(long) {
         return None;
     }
-    let multiples = multiples(field, basis);
-    let n = multiples.len() as f64;
+    scratch.clear();
+    let mut total = 0.0;
+    multiples(field, basis, |_, v, overlap| {
+        scratch.push((v, overlap));
+        total += overlap;
+    });
+    let n = scratch.len() as f64;
     if n < 3.0 {
         return None;
     }
-    let preference = libm::pow(cells, ALPHA - 1.0);
     let strength = |excess: f64, correlation: f64| {
         (excess.max(0.0) * correlation.max(0.0)).sqrt() * n / (n + PRIOR)
     };
-    // The strength that a goodness needs; a little less, so that rounding gives nothing up.
-    let needed =
-        prune.map(|p| (p.bounds, libm::pow(p.least / preference, 0.5 / ALPHA) * (1.0 - 1e-9)));
-    let total: f64 = multiples.iter().map(|&(_, v)| field.overlap(v)).sum();
+    let needed = prune.map(|p| (p.bounds, p.needed(cell)));
     let (mut excess, mut squares, mut correlation, mut left) = (0.0, 0.0, 0.0, total);
-    for &(_, v) in &multiples {
-        let weight = field.overlap(v);
+    for &(v, weight) in &*scratch {
         let (c, e) = field.sample(v);
         excess += weight * e;
         squares += weight * e * e;
@@ -228,8 +312,12 @@ pub(super) fn goodness(field: &Field, basis: Basis, prune: Option<Prune>) -> Opt
     let (excess, correlation) = (excess / total, correlation / total);
     let error = ((squares / total - excess * excess).max(0.0) / (n - 1.0)).sqrt();
     let strength = strength(excess - error, correlation);
-    let goodness = libm::pow(strength * strength, ALPHA) * preference;
-    (goodness > 0.0).then_some(Candidate { basis, goodness, strength, correlation })
+    let goodness = libm::pow(strength * strength, ALPHA) * libm::pow(cells, ALPHA - 1.0);
+    if goodness <= 0.0 {
+        return None;
+    }
+    prune.inspect(|prune| prune.note(goodness));
+    Some(Candidate { basis, goodness, strength, correlation })
 }
 
 #[cfg(test)]
@@ -264,12 +352,27 @@ mod tests {
     #[test]
     fn pruning_gives_pairs_up() {
         let field = field(1, true);
-        let bounds = bounds(&field, 3.0);
-        let least = best(&field, 3.0)[0].goodness;
-        let off = [[9.4, 4.0], [-4.0, 9.4]];
-        assert!(goodness(&field, off, Some(Prune { bounds, least })).is_none());
-        assert!(
-            goodness(&field, [[11.0, 0.0], [0.0, 9.0]], Some(Prune { bounds, least })).is_some()
+        let prune = Prune::new(&field, 3.0);
+        let best = best(&field, 3.0)[0];
+        (0..FINALISTS).for_each(|_| prune.note(best.goodness));
+        let try_it = |basis: Basis| goodness(&field, basis, Some(&prune), &mut Vec::new());
+        assert!(try_it([[9.4, 4.0], [-4.0, 9.4]]).is_none());
+        assert_eq!(try_it(best.basis), Some(best));
+        // Of the smallest area of a step, which is a 32nd smaller at most.
+        let needed = prune.needed(area(best.basis));
+        assert!(needed <= best.strength && needed > 0.998 * best.strength, "{needed} {best:?}");
+    }
+
+    #[test]
+    fn nearest_and_seconds() {
+        for v in [0.0, 0.49, 0.5, 1.5, 2.5, 7.3, 1e6 + 0.5] {
+            assert_eq!([nearest(v), nearest(-v)], [v.round(), (-v).round()]);
+        }
+        let peaks = [[3.0, 4.0], [3.2, 4.1], [9.0, 1.0], [1.0, 0.2]];
+        let found: Vec<Vector> = seconds([1.5, 0.0], &peaks).collect();
+        assert_eq!(
+            found,
+            [[0.0, 4.0], [0.200_000_000_000_000_18, 4.1]].map(|v: Vector| directed(v))[..1]
         );
     }
 
@@ -277,7 +380,11 @@ mod tests {
     fn multiples_are_those_of_one_half_plane_near_enough() {
         let field = field(2, false);
         let basis = [[11.0, 2.0], [-3.0, 9.0]];
-        let got = multiples(&field, basis);
+        let mut got = Vec::new();
+        multiples(&field, basis, |_, v, overlap| {
+            assert_eq!(overlap, field.overlap(v));
+            got.push(v);
+        });
         let far = DISTANCE * DISTANCE * area(basis);
         let mut count = 0;
         for a in -20..=20 {
@@ -286,7 +393,7 @@ mod tests {
                 let near = dot(v, v) <= far && field.covers(v) && field.overlap(v) >= OVERLAP;
                 if near && (b > 0 || (b == 0 && a > 0)) {
                     count += 1;
-                    assert!(got.iter().any(|&(_, u)| u == v), "{a}, {b}");
+                    assert!(got.contains(&v), "{a}, {b}");
                 }
             }
         }

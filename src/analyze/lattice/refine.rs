@@ -24,12 +24,12 @@ pub(super) fn fitted(field: &Field, basis: Basis) -> Basis {
         // Normal equations: of the coefficients, and with the two components of the peaks.
         let (mut aa, mut ab, mut bb) = (0.0, 0.0, 0.0);
         let mut sums = [[0.0; 2]; 2];
-        for ([a, b], at) in multiples(field, fit) {
+        multiples(field, fit, |[a, b], at, overlap| {
             if a.abs() > most || b.abs() > most {
-                continue;
+                return;
             }
-            let Some((peak, value)) = peak(field, at, near) else { continue };
-            let weight = value * field.overlap(at);
+            let Some((peak, value)) = peak(field, at, near) else { return };
+            let weight = value * overlap;
             aa += weight * a * a;
             ab += weight * a * b;
             bb += weight * b * b;
@@ -37,7 +37,7 @@ pub(super) fn fitted(field: &Field, basis: Basis) -> Basis {
                 sums[0][k] += weight * a * peak[k];
                 sums[1][k] += weight * b * peak[k];
             }
-        }
+        });
         let det = aa * bb - ab * ab;
         if det <= 1e-6 * (aa + bb).powi(2) {
             return basis;
@@ -57,7 +57,7 @@ pub(super) fn fitted(field: &Field, basis: Basis) -> Basis {
 
 /// The candidate with its basis fitted; as it was, if that is no better.
 pub(super) fn improved(field: &Field, candidate: Candidate) -> Candidate {
-    match goodness(field, fitted(field, candidate.basis), None) {
+    match goodness(field, fitted(field, candidate.basis), None, &mut Vec::new()) {
         Some(fit) if fit.goodness >= candidate.goodness => fit,
         _ => candidate,
     }

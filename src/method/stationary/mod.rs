@@ -356,7 +356,7 @@ fn synthesize(
 /// The pixel in the middle of each matched patch.
 fn centers(field: &Field, patch: usize) -> Vec<seams::From> {
     let half = patch / 2;
-    field.pos.iter().map(|p: &Pos| [(p.y() + half) as u32, (p.x() + half) as u32]).collect()
+    field.pos.par_iter().map(|p: &Pos| [(p.y() + half) as u32, (p.x() + half) as u32]).collect()
 }
 
 /// The source map, of this `size`, of pixels of an atlas of photos of these sizes.

@@ -102,6 +102,8 @@ impl MatchImage {
 pub trait Kernel: Copy + Send + Sync {
     /// The rows of one patch, held ready.
     type Query;
+    /// Sums of squared differences, in parts.
+    type Sums: Copy;
 
     /// An empty query, to be reused from patch to patch.
     fn query(&self) -> Self::Query;
@@ -109,9 +111,50 @@ pub trait Kernel: Copy + Send + Sync {
     /// Holds the patch of `image` whose top left pixel has index `at` ready.
     fn hold(&self, query: &mut Self::Query, image: &MatchImage, at: usize);
 
+    /// Nothing summed yet.
+    fn nothing(&self) -> Self::Sums;
+
+    /// Adds the squared differences of every third row, from row `first` on, of the held patch and the
+    /// patch of `image` whose top left pixel has index `at`.
+    fn add_third(
+        &self,
+        sums: Self::Sums,
+        query: &Self::Query,
+        image: &MatchImage,
+        at: usize,
+        first: usize,
+    ) -> Self::Sums;
+
+    /// The sum of all parts.
+    fn total(&self, sums: Self::Sums) -> i32;
+
     /// Squared distance between the held patch and the patch of `image` whose top left pixel has
     /// index `at`: the sum over rows, columns and channels.
-    fn distance(&self, query: &Self::Query, image: &MatchImage, at: usize) -> i32;
+    #[inline(always)]
+    fn distance(&self, query: &Self::Query, image: &MatchImage, at: usize) -> i32 {
+        let sums = self.add_third(self.nothing(), query, image, at, 0);
+        let sums = self.add_third(sums, query, image, at, 1);
+        self.total(self.add_third(sums, query, image, at, 2))
+    }
+
+    /// That distance if it is below `limit`; else some number from `limit` to the distance, mostly after a
+    /// third of the work.
+    #[inline(always)]
+    fn distance_below(
+        &self,
+        query: &Self::Query,
+        image: &MatchImage,
+        at: usize,
+        limit: i32,
+    ) -> i32 {
+        let sums = self.add_third(self.nothing(), query, image, at, 0);
+        let part = self.total(sums);
+        if part >= limit {
+            return part;
+        }
+        let sums = self.add_third(sums, query, image, at, 1);
+        self.total(self.add_third(sums, query, image, at, 2))
+    }
 
     /// How the squared distance of two patches changes when both move by a row: that of the rows
     /// that enter less that of the rows that leave. `a` and `b` are a picture with the pixel

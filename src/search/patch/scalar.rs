@@ -10,6 +10,7 @@ pub(super) struct Scalar {
 
 impl Kernel for Scalar {
     type Query = Vec<u8>;
+    type Sums = i32;
 
     fn query(&self) -> Vec<u8> {
         vec![0; 4 * self.patch * self.patch]
@@ -24,12 +25,27 @@ impl Kernel for Scalar {
         }
     }
 
+    fn nothing(&self) -> i32 {
+        0
+    }
+
     #[inline]
-    fn distance(&self, query: &Vec<u8>, image: &MatchImage, at: usize) -> i32 {
-        let n = self.patch;
-        let rows = query.chunks_exact(4 * n).enumerate();
-        rows.map(|(row, held)| squares(held, image.codes_from(at + row * image.stride, 4 * n)))
-            .sum()
+    fn add_third(
+        &self,
+        sums: i32,
+        query: &Vec<u8>,
+        image: &MatchImage,
+        at: usize,
+        first: usize,
+    ) -> i32 {
+        let n = 4 * self.patch;
+        let rows = query.chunks_exact(n).enumerate().skip(first).step_by(3);
+        let row = |(row, held)| squares(held, image.codes_from(at + row * image.stride, n));
+        sums + rows.map(row).sum::<i32>()
+    }
+
+    fn total(&self, sums: i32) -> i32 {
+        sums
     }
 
     #[inline]

@@ -125,10 +125,14 @@ mod x86 {
 
     /// The default patch side: a row is one register, and all rows stay in registers.
     #[derive(Debug, Clone, Copy)]
-    struct Eleven<M>(std::marker::PhantomData<M>);
+    struct Eleven<M> {
+        inside: __mmask64,
+        method: std::marker::PhantomData<M>,
+    }
 
     impl<M: MultiplyAdd512> Kernel for Eleven<M> {
         type Query = [__m512i; 11];
+        type Sums = [__m512i; 2];
 
         #[inline(always)]
         fn query(&self) -> [__m512i; 11] {
@@ -146,26 +150,50 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn distance(&self, query: &[__m512i; 11], image: &MatchImage, at: usize) -> i32 {
+        fn nothing(&self) -> [__m512i; 2] {
+            // SAFETY: as above.
+            [unsafe { _mm512_setzero_si512() }; 2]
+        }
+
+        #[inline(always)]
+        fn add_third(
+            &self,
+            mut sums: [__m512i; 2],
+            query: &[__m512i; 11],
+            image: &MatchImage,
+            at: usize,
+            first: usize,
+        ) -> [__m512i; 2] {
             let start = checked(image, at, 11, 11);
             let stride = image.stride * 4;
-            let [inside, _] = inside(11);
-            // SAFETY: inside the picture, or its tail, by `checked`; features as above.
-            unsafe {
+            for row in (first..11).step_by(3) {
                 // Two sums, so that no multiply-add waits for the one before it.
-                let mut sums = [_mm512_setzero_si512(); 2];
-                for (row, &f) in query.iter().enumerate() {
+                let sum = &mut sums[row % 2];
+                // SAFETY: inside the picture, or its tail, by `checked`; features as above.
+                unsafe {
                     let e = _mm512_loadu_si512(start.add(row * stride).cast());
-                    sums[row % 2] = add_squares::<M>(sums[row % 2], f, e, inside);
+                    *sum = add_squares::<M>(*sum, query[row], e, self.inside);
                 }
-                _mm512_reduce_add_epi32(_mm512_add_epi32(sums[0], sums[1]))
             }
+            sums
+        }
+
+        #[inline(always)]
+        fn total(&self, sums: [__m512i; 2]) -> i32 {
+            total_512(sums)
         }
 
         #[inline(always)]
         fn row_change(&self, a: (&MatchImage, [usize; 2]), b: (&MatchImage, [usize; 2])) -> i32 {
             row_change_512::<M>(11, a, b)
         }
+    }
+
+    /// See [`Kernel::total`].
+    #[inline(always)]
+    fn total_512(sums: [__m512i; 2]) -> i32 {
+        // SAFETY: a kernel exists only inside `run_*`, where the features are.
+        unsafe { _mm512_reduce_add_epi32(_mm512_add_epi32(sums[0], sums[1])) }
     }
 
     /// See [`Kernel::row_change`].
@@ -205,6 +233,7 @@ mod x86 {
 
     impl<M: MultiplyAdd512> Kernel for Any512<M> {
         type Query = [[__m512i; 2]; PATCH_MAX];
+        type Sums = [__m512i; 2];
 
         #[inline(always)]
         fn query(&self) -> Self::Query {
@@ -225,14 +254,26 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn distance(&self, query: &Self::Query, image: &MatchImage, at: usize) -> i32 {
+        fn nothing(&self) -> [__m512i; 2] {
+            // SAFETY: as above.
+            [unsafe { _mm512_setzero_si512() }; 2]
+        }
+
+        #[inline(always)]
+        fn add_third(
+            &self,
+            mut sums: [__m512i; 2],
+            query: &Self::Query,
+            image: &MatchImage,
+            at: usize,
+            first: usize,
+        ) -> [__m512i; 2] {
             let start = checked(image, at, self.patch, self.patch);
             let stride = image.stride * 4;
             let inside = inside(self.patch);
-            // SAFETY: inside the picture, or its tail, by `checked`; features as above.
-            unsafe {
-                let mut sums = [_mm512_setzero_si512(); 2];
-                for (row, held) in query[..self.patch].iter().enumerate() {
+            for (row, held) in query[..self.patch].iter().enumerate().skip(first).step_by(3) {
+                // SAFETY: inside the picture, or its tail, by `checked`; features as above.
+                unsafe {
                     let row = start.add(row * stride);
                     let e = _mm512_loadu_si512(row.cast());
                     sums[0] = add_squares::<M>(sums[0], held[0], e, inside[0]);
@@ -241,8 +282,13 @@ mod x86 {
                         sums[1] = add_squares::<M>(sums[1], held[1], e, inside[1]);
                     }
                 }
-                _mm512_reduce_add_epi32(_mm512_add_epi32(sums[0], sums[1]))
             }
+            sums
+        }
+
+        #[inline(always)]
+        fn total(&self, sums: [__m512i; 2]) -> i32 {
+            total_512(sums)
         }
 
         #[inline(always)]
@@ -291,7 +337,7 @@ mod x86 {
         /// # Safety
         /// The CPU has AVX2.
         #[inline(always)]
-        unsafe fn total(sum: __m256i) -> i32 {
+        unsafe fn sum(sum: __m256i) -> i32 {
             // SAFETY: the caller's promise.
             unsafe {
                 let sum =
@@ -305,6 +351,7 @@ mod x86 {
 
     impl<const N: usize> Kernel for Any256<N> {
         type Query = [[__m256i; 3]; PATCH_MAX];
+        type Sums = [__m256i; 3];
 
         #[inline(always)]
         fn query(&self) -> Self::Query {
@@ -327,21 +374,39 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn distance(&self, query: &Self::Query, image: &MatchImage, at: usize) -> i32 {
+        fn nothing(&self) -> [__m256i; 3] {
+            // SAFETY: as above.
+            [unsafe { _mm256_setzero_si256() }; 3]
+        }
+
+        #[inline(always)]
+        fn add_third(
+            &self,
+            mut sums: [__m256i; 3],
+            query: &Self::Query,
+            image: &MatchImage,
+            at: usize,
+            first: usize,
+        ) -> [__m256i; 3] {
             let n = self.side();
             let start = checked(image, at, n, n);
             let stride = image.stride * 4;
-            // SAFETY: inside the picture, or its tail, by `checked`; feature as above.
-            unsafe {
-                let mut sums = [_mm256_setzero_si256(); 3];
-                for (row, held) in query[..n].iter().enumerate() {
-                    for (i, &f) in held.iter().enumerate().take(n.div_ceil(8)) {
+            for (row, held) in query[..n].iter().enumerate().skip(first).step_by(3) {
+                for (i, &f) in held.iter().enumerate().take(n.div_ceil(8)) {
+                    // SAFETY: inside the picture, or its tail, by `checked`; feature as above.
+                    unsafe {
                         let e = _mm256_loadu_si256(start.add(row * stride + 32 * i).cast());
                         sums[i] = _mm256_add_epi32(sums[i], self.squares(f, e, i));
                     }
                 }
-                Self::total(_mm256_add_epi32(_mm256_add_epi32(sums[0], sums[1]), sums[2]))
             }
+            sums
+        }
+
+        #[inline(always)]
+        fn total(&self, [a, b, c]: [__m256i; 3]) -> i32 {
+            // SAFETY: feature as above.
+            unsafe { Self::sum(_mm256_add_epi32(_mm256_add_epi32(a, b), c)) }
         }
 
         #[inline(always)]
@@ -362,7 +427,7 @@ mod x86 {
                 }
             }
             // SAFETY: feature as above.
-            unsafe { Self::total(_mm256_sub_epi32(sums[0], sums[1])) }
+            unsafe { Self::sum(_mm256_sub_epi32(sums[0], sums[1])) }
         }
     }
 
@@ -381,7 +446,13 @@ mod x86 {
     #[inline(always)]
     fn run512<M: MultiplyAdd512, W: WithKernel>(patch: usize, work: W) -> W::Output {
         let method = std::marker::PhantomData::<M>;
-        if patch == 11 { work.run(Eleven(method)) } else { work.run(Any512 { patch, method }) }
+        if patch == 11 {
+            // Of a mask that it knows the compiler makes a further instruction a row.
+            let inside = std::hint::black_box(inside(11)[0]);
+            work.run(Eleven { inside, method })
+        } else {
+            work.run(Any512 { patch, method })
+        }
     }
 
     /// Runs the work compiled for AVX2.

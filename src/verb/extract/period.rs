@@ -1,7 +1,5 @@
 //! The photo's period: found, and made whole.
 
-use rayon::prelude::*;
-
 use crate::analyze::lattice;
 use crate::analyze::period::{period, rectangle};
 use crate::base::ctx::Ctx;
@@ -23,10 +21,7 @@ const MOST_ENLARGED: f64 = 0.005;
 
 /// The colours that are compared.
 pub(super) fn colors(picture: &Picture) -> Vec<[f32; 3]> {
-    let model = ColorModel::new(picture);
-    let mut colors = model.averaging_pixels(picture);
-    colors.par_chunks_mut(picture.width()).for_each(|row| model.space().convert_row(row));
-    colors
+    ColorModel::new(picture).matching_pixels(picture)
 }
 
 /// The period that was given, or that is found.
