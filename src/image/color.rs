@@ -130,14 +130,12 @@ impl ColorModel {
     /// Three channels a pixel in the space where averages are right: linear light for colours, the
     /// numbers themselves for data (their principal components if there are more than three).
     pub fn averaging_pixels(&self, picture: &Picture) -> Vec<[f32; 3]> {
-        let c = picture.channels();
         match picture.samples() {
-            Samples::U8(v) => v.par_chunks_exact(c).map(|px| self.by_table(px)).collect(),
-            Samples::U16(v) => v.par_chunks_exact(c).map(|px| self.by_table(px)).collect(),
-            samples => with_samples!(samples, v => v
-                .par_chunks_exact(c)
-                .map(|px| self.averaging(c, |k| px[k].to_unit()))
-                .collect()),
+            Samples::U8(v) => pixels(picture, v, |px| self.by_table(px)),
+            Samples::U16(v) => pixels(picture, v, |px| self.by_table(px)),
+            samples => with_samples!(samples, v => {
+                pixels(picture, v, |px| self.averaging(px.len(), |k| px[k].to_unit()))
+            }),
         }
     }
 
@@ -190,6 +188,21 @@ impl ColorModel {
         }
         std::array::from_fn(|k| self.channel(px.len(), k).map_or(0.0, |k| self.table[px[k].into()]))
     }
+}
+
+/// What `of` makes of every pixel's samples, row by row.
+fn pixels<T: Sample>(
+    picture: &Picture,
+    samples: &[T],
+    of: impl Fn(&[T]) -> [f32; 3] + Sync,
+) -> Vec<[f32; 3]> {
+    let (width, c) = (picture.width(), picture.channels());
+    let mut out = vec![[0.0; 3]; picture.height() * width];
+    let rows = out.par_chunks_exact_mut(width).zip(samples.par_chunks_exact(width * c));
+    rows.for_each(|(out, row)| {
+        out.iter_mut().zip(row.chunks_exact(c)).for_each(|(out, px)| *out = of(px));
+    });
+    out
 }
 
 /// The three strongest principal components of a picture with many channels.

@@ -18,6 +18,9 @@ use crate::search::source::Source;
 /// Rows of a band. Fewer rows: more parallel work, slower propagation between bands.
 const BAND: usize = 32;
 
+/// Stage of the random candidates.
+const RANDOM: u32 = 3;
+
 /// Most random candidates a pixel.
 const MAX_RANDOM: usize = 16;
 
@@ -72,7 +75,7 @@ pub fn pass(
     let bands = std::iter::once((0, first)).filter(|(_, rows)| !rows.is_empty());
     let rest = rest.chunks_mut(BAND * field.width).enumerate();
     let bands: Vec<_> = bands.chain(rest.map(|(i, rows)| (head + i * BAND, rows))).collect();
-    bands.into_par_iter().try_for_each(|(y0, rows)| {
+    bands.into_par_iter().with_max_len(1).try_for_each(|(y0, rows)| {
         with_kernel(ctx.simd, source.patch, BandJob { band: &band, ctx, y0, rows })
     })?;
     field.pos = next;
@@ -132,13 +135,10 @@ impl Band<'_> {
             });
             let row = &mut rows[row * width..(row + 1) * width];
             // Drawn for the whole row ahead: the search need not wait for the dice.
-            let items = (y * width..).zip(row.iter());
-            for ((item, own), out) in items.zip(random.chunks_exact_mut(radii.len().max(1))) {
-                self.random_candidates(*own, &radii, item, out);
-            }
+            self.random_candidates(row, y, &radii, &mut random);
             if let Some(phase) = &self.search.phase {
                 for (i, pos) in random.iter_mut().enumerate() {
-                    *pos = phase.near(self.source, (y, i / radii.len()), *pos);
+                    *pos = phase.near(self.source, (y, i % width), *pos);
                 }
             }
             let end = if backward { 0 } else { width - 1 };
@@ -186,7 +186,7 @@ impl Band<'_> {
                 let (mut best, mut found, mut distance) =
                     ((best >> 8) as i32, candidates[i], distances[i]);
                 // Most random ones are much worse, which a part of the patch shows.
-                for &pos in &random[x * radii.len()..][..radii.len()] {
+                for &pos in random.iter().skip(x).step_by(width) {
                     if !self.source.is_usable(pos) {
                         continue;
                     }
@@ -238,19 +238,22 @@ impl Band<'_> {
         (0..n).map(|i| (widest as i32 >> i).max(1)).collect()
     }
 
-    /// Positions around `own`, one a radius.
+    /// Positions around those of row `y`: a row of them for every radius.
     #[inline(always)]
-    fn random_candidates(&self, own: Pos, radii: &[i32], item: usize, out: &mut [Pos]) {
-        const STAGE: u32 = 3;
-        let mut rng = Rng::new(self.seed, STAGE, self.search.pass, item as u64);
-        let (rows, cols) = (self.source.rows() as i32, self.source.cols() as i32);
-        let (y, x) = (own.y() as i32, own.x() as i32);
-        for (&radius, out) in radii.iter().zip(out) {
-            let (y_low, y_high) = ((y - radius).max(0), (y + radius).min(rows - 1));
-            let (x_low, x_high) = ((x - radius).max(0), (x + radius).min(cols - 1));
-            let y = y_low + rng.below((y_high - y_low + 1) as u32) as i32;
-            let x = x_low + rng.below((x_high - x_low + 1) as u32) as i32;
-            *out = Pos::new(y as usize, x as usize);
+    fn random_candidates(&self, row: &[Pos], y: usize, radii: &[i32], out: &mut [Pos]) {
+        let draws = Rng::new(self.seed, RANDOM, self.search.pass, y as u64);
+        let last = [self.source.rows() as i32 - 1, self.source.cols() as i32 - 1];
+        for (i, (&radius, out)) in radii.iter().zip(out.chunks_exact_mut(row.len())).enumerate() {
+            for (x, (own, out)) in row.iter().zip(out).enumerate() {
+                let bits = draws.nth((i * row.len() + x) as u64);
+                // One of those from `low` to `high`, by 32 bits.
+                let within = |at: usize, last: i32, bits: u64| {
+                    let (low, high) = ((at as i32 - radius).max(0), (at as i32 + radius).min(last));
+                    low as usize + ((bits * (high - low + 1) as u64) >> 32) as usize
+                };
+                let y = within(own.y(), last[0], bits >> 32);
+                *out = Pos::new(y, within(own.x(), last[1], bits & 0xffff_ffff));
+            }
         }
     }
 

@@ -56,8 +56,8 @@ fn random_field(height: usize, width: usize, source: &Source, seed: u64) -> Fiel
     Field::random(height, width, source, seed)
 }
 
-/// Distances by a kernel, the query held again for each pair, and how they change when both
-/// patches move down by a row (where both can).
+/// Distances by a kernel, the query held again for each pair, as they are and below limits, and how they
+/// change when both patches move down by a row (where both can).
 struct Distances<'a>(&'a MatchImage, &'a MatchImage, &'a [(usize, usize)], usize);
 
 impl WithKernel for Distances<'_> {
@@ -69,7 +69,13 @@ impl WithKernel for Distances<'_> {
         let mut query = kernel.query();
         let distance = |&(a, b): &(usize, usize)| {
             kernel.hold(&mut query, image_a, a);
-            kernel.distance(&query, image_b, b)
+            let distance = kernel.distance(&query, image_b, b);
+            for limit in [0, 1, distance / 8, distance / 3, distance, distance + 1, i32::MAX] {
+                let below = kernel.distance_below(&query, image_b, b, limit);
+                let some = if distance < limit { distance..=distance } else { limit..=distance };
+                assert!(some.contains(&below), "{below} below {limit} of {distance}");
+            }
+            distance
         };
         let change = |&(a, b): &(usize, usize)| {
             let rows = |m: &MatchImage, at: usize| [at + n * m.stride(), at];

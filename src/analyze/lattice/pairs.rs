@@ -66,7 +66,8 @@ fn search(field: &Field, shortest: f64, prune: bool) -> Vec<Candidate> {
         }
         found
     };
-    let found: Vec<Vec<Candidate>> = (0..peaks.len()).into_par_iter().map(with).collect();
+    let found: Vec<Vec<Candidate>> =
+        (0..peaks.len()).into_par_iter().with_max_len(1).map(with).collect();
     let mut finalists = Vec::new();
     found.into_iter().flatten().for_each(|candidate| insert(&mut finalists, candidate));
     finalists

@@ -288,11 +288,11 @@ fn typical_quantiles(source: &Source) -> [Option<Quantiles>; CONTRAST] {
         let domain = Domain { height, width, wrap_y: false, wrap_x: false };
         let sigma = TYPICAL_WINDOW * height.min(width) as f64;
         let weight = usable.iter().filter(|&&ok| ok).count() as f64;
-        for (k, all) in all.iter_mut().enumerate() {
+        all.par_iter_mut().enumerate().for_each(|(k, all)| {
             let code = |i: usize| usable[i].then_some(soft[i][k]);
             let local = LocalDistributions::new(code, domain, sigma);
             all.extend(local.typical().map(|typical| (typical, weight)));
-        }
+        });
     }
     all.map(|all| Quantiles::pooled(&all))
 }

@@ -418,15 +418,18 @@ fn effort(plan: &Plan, level: &Level, coarsest: bool) -> (u32, Search) {
 /// Moves each channel's values towards the exemplar's distribution: `Q_target = alpha Q_e +
 /// (1 - alpha) Q_f`, where the contrast is pulled at least by [`CONTRAST_PULL`].
 fn match_global(votes: &mut Votes, level: &Level, alpha: f32) {
-    for k in 0..4 {
+    let soft = &votes.soft;
+    let table = |k: usize| {
         let alpha = if k == CONTRAST { alpha.max(CONTRAST_PULL) } else { alpha };
-        if alpha <= 0.0 {
-            continue;
-        }
-        let own = Distribution::of_channel(&votes.soft, k).expect("some pixels");
-        let table = level.quantiles[k].matching_table(&own, alpha);
-        votes.soft.par_iter_mut().for_each(|px| px[k] = table[px[k] as usize]);
-    }
+        (alpha > 0.0).then(|| {
+            let own = Distribution::of_channel(soft, k).expect("some pixels");
+            (k, level.quantiles[k].matching_table(&own, alpha))
+        })
+    };
+    let tables: Vec<(usize, Vec<u16>)> = (0..4).into_par_iter().filter_map(table).collect();
+    votes.soft.par_iter_mut().for_each(|px| {
+        tables.iter().for_each(|(k, table)| px[*k] = table[px[*k] as usize]);
+    });
 }
 
 /// The votes as codes, `rows` x `cols` of them starting at (`y0`, `x0`), which wrap around.

@@ -114,9 +114,9 @@ pub trait Kernel: Copy + Send + Sync {
     /// Nothing summed yet.
     fn nothing(&self) -> Self::Sums;
 
-    /// Adds the squared differences of every third row, from row `first` on, of the held patch and the
+    /// Adds the squared differences of every sixth row, from row `first` on, of the held patch and the
     /// patch of `image` whose top left pixel has index `at`.
-    fn add_third(
+    fn add_rows(
         &self,
         sums: Self::Sums,
         query: &Self::Query,
@@ -132,13 +132,15 @@ pub trait Kernel: Copy + Send + Sync {
     /// index `at`: the sum over rows, columns and channels.
     #[inline(always)]
     fn distance(&self, query: &Self::Query, image: &MatchImage, at: usize) -> i32 {
-        let sums = self.add_third(self.nothing(), query, image, at, 0);
-        let sums = self.add_third(sums, query, image, at, 1);
-        self.total(self.add_third(sums, query, image, at, 2))
+        let mut sums = self.nothing();
+        for first in 0..6 {
+            sums = self.add_rows(sums, query, image, at, first);
+        }
+        self.total(sums)
     }
 
     /// That distance if it is below `limit`; else some number from `limit` to the distance, mostly after a
-    /// third of the work.
+    /// few rows.
     #[inline(always)]
     fn distance_below(
         &self,
@@ -147,13 +149,22 @@ pub trait Kernel: Copy + Send + Sync {
         at: usize,
         limit: i32,
     ) -> i32 {
-        let sums = self.add_third(self.nothing(), query, image, at, 0);
+        let mut sums = self.add_rows(self.nothing(), query, image, at, 2);
         let part = self.total(sums);
         if part >= limit {
             return part;
         }
-        let sums = self.add_third(sums, query, image, at, 1);
-        self.total(self.add_third(sums, query, image, at, 2))
+        for first in [0, 4] {
+            sums = self.add_rows(sums, query, image, at, first);
+        }
+        let part = self.total(sums);
+        if part >= limit {
+            return part;
+        }
+        for first in [1, 3, 5] {
+            sums = self.add_rows(sums, query, image, at, first);
+        }
+        self.total(sums)
     }
 
     /// How the squared distance of two patches changes when both move by a row: that of the rows

@@ -14,7 +14,10 @@ use crate::base::ctx::Simd;
 pub(super) fn detect() -> Simd {
     #[cfg(target_arch = "x86_64")]
     {
-        if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512bw") {
+        let avx512 = is_x86_feature_detected!("avx512f")
+            && is_x86_feature_detected!("avx512bw")
+            && is_x86_feature_detected!("avx512dq");
+        if avx512 {
             return if is_x86_feature_detected!("avx512vnni") {
                 Simd::Avx512Vnni
             } else {
@@ -156,7 +159,7 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn add_third(
+        fn add_rows(
             &self,
             mut sums: [__m512i; 2],
             query: &[__m512i; 11],
@@ -166,9 +169,9 @@ mod x86 {
         ) -> [__m512i; 2] {
             let start = checked(image, at, 11, 11);
             let stride = image.stride * 4;
-            for row in (first..11).step_by(3) {
+            for row in (first..11).step_by(6) {
                 // Two sums, so that no multiply-add waits for the one before it.
-                let sum = &mut sums[row % 2];
+                let sum = &mut sums[row / 6];
                 // SAFETY: inside the picture, or its tail, by `checked`; features as above.
                 unsafe {
                     let e = _mm512_loadu_si512(start.add(row * stride).cast());
@@ -260,7 +263,7 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn add_third(
+        fn add_rows(
             &self,
             mut sums: [__m512i; 2],
             query: &Self::Query,
@@ -271,7 +274,7 @@ mod x86 {
             let start = checked(image, at, self.patch, self.patch);
             let stride = image.stride * 4;
             let inside = inside(self.patch);
-            for (row, held) in query[..self.patch].iter().enumerate().skip(first).step_by(3) {
+            for (row, held) in query[..self.patch].iter().enumerate().skip(first).step_by(6) {
                 // SAFETY: inside the picture, or its tail, by `checked`; features as above.
                 unsafe {
                     let row = start.add(row * stride);
@@ -380,7 +383,7 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn add_third(
+        fn add_rows(
             &self,
             mut sums: [__m256i; 3],
             query: &Self::Query,
@@ -391,7 +394,7 @@ mod x86 {
             let n = self.side();
             let start = checked(image, at, n, n);
             let stride = image.stride * 4;
-            for (row, held) in query[..n].iter().enumerate().skip(first).step_by(3) {
+            for (row, held) in query[..n].iter().enumerate().skip(first).step_by(6) {
                 for (i, &f) in held.iter().enumerate().take(n.div_ceil(8)) {
                     // SAFETY: inside the picture, or its tail, by `checked`; feature as above.
                     unsafe {
@@ -432,13 +435,13 @@ mod x86 {
     }
 
     /// Runs the work compiled for AVX-512 with VNNI.
-    #[target_feature(enable = "avx2,avx512f,avx512bw,avx512vnni")]
+    #[target_feature(enable = "avx2,avx512f,avx512bw,avx512dq,avx512vnni")]
     pub(super) fn run_vnni<W: WithKernel>(patch: usize, work: W) -> W::Output {
         run512::<Vnni, W>(patch, work)
     }
 
     /// Runs the work compiled for AVX-512.
-    #[target_feature(enable = "avx2,avx512f,avx512bw")]
+    #[target_feature(enable = "avx2,avx512f,avx512bw,avx512dq")]
     pub(super) fn run_avx512<W: WithKernel>(patch: usize, work: W) -> W::Output {
         run512::<NoVnni, W>(patch, work)
     }

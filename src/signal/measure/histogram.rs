@@ -9,7 +9,9 @@ use crate::signal::window::{Domain, Window};
 
 /// Earth mover's distance between the histograms of two places, summed over the channels.
 pub(super) fn cost(pixels: &[[f32; 3]], domain: Domain, window: &Window) -> f64 {
-    (0..3).map(|k| plane_cost(|i| pixels[i][k], pixels.len(), domain, window)).sum()
+    let cost = |k: usize| plane_cost(|i| pixels[i][k], pixels.len(), domain, window);
+    let costs: Vec<f64> = (0..3).into_par_iter().map(cost).collect();
+    costs.iter().sum()
 }
 
 /// The same of one value a pixel, of 128 bins over the range of the values.

@@ -104,19 +104,22 @@ fn project_channels(
     domain: Domain,
     window: &Window,
     share: f32,
-    mapping: impl Fn(&(dyn Fn(usize) -> u16 + Sync), f64) -> Mapping,
+    mapping: impl Fn(&(dyn Fn(usize) -> u16 + Sync), f64) -> Mapping + Sync,
 ) {
-    for k in channels {
+    let wanted = |k: usize| {
         let first = pixels[0][k];
-        if pixels.iter().all(|px| px[k] == first) {
-            continue;
-        }
         let code = |i: usize| pixels[i][k];
-        let wanted = wanted(code, domain, window, |sigma| mapping(&code, sigma));
-        pixels.par_iter_mut().zip(wanted).for_each(|(px, even)| {
-            px[k] = rounded(px[k] as f32 + share * (even - px[k] as f32));
-        });
-    }
+        let varies = pixels.iter().any(|px| px[k] != first);
+        varies.then(|| (k, wanted(code, domain, window, |sigma| mapping(&code, sigma))))
+    };
+    // Of a small picture a channel alone is too little work to share.
+    let wanted: Vec<(usize, Vec<f32>)> = channels.into_par_iter().filter_map(wanted).collect();
+    pixels.par_iter_mut().enumerate().for_each(|(i, px)| {
+        for (k, wanted) in &wanted {
+            let now = px[*k] as f32;
+            px[*k] = rounded(now + share * (wanted[i] - now));
+        }
+    });
 }
 
 /// Of the middles of a grid's cells, `n` numbers each: `cell(sigma)` gives a grid and the numbers of
