@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::base::error::{Error, Result};
-use crate::image::color::{linear_from_srgb, srgb_from_linear};
+use crate::image::color::SrgbTables;
 use crate::image::material::MapKind;
 use crate::image::normals::renormalize;
 use crate::image::picture::{Encoding, Picture, Sample, Samples};
@@ -28,9 +28,10 @@ pub fn mixed(
         return Err(Error::SizeMismatch { what, got_w, got_h, want_w: w, want_h: h, remedy });
     }
     let curved = a.encoding == Encoding::Srgb && kind == MapKind::Color;
+    let curve = curved.then(SrgbTables::get);
     let alpha = a.alpha_channel();
     let samples =
-        with_samples!(a.samples(), v => mixed_samples(v, b.samples(), (c, alpha, curved), &share));
+        with_samples!(a.samples(), v => mixed_samples(v, b.samples(), (c, alpha, curve), &share));
     let picture = a.with_samples(h, w, c, samples)?;
     if kind.is_normal() { renormalize(picture) } else { Ok(picture) }
 }
@@ -38,7 +39,7 @@ pub fn mixed(
 fn mixed_samples<T: Sample>(
     a: &[T],
     b: &Samples,
-    (c, alpha, curved): (usize, Option<usize>, bool),
+    (c, alpha, curve): (usize, Option<usize>, Option<&SrgbTables>),
     share: &(impl Fn(usize) -> f64 + Sync),
 ) -> Samples {
     let b = T::slice(b).unwrap_or(a);
@@ -51,10 +52,9 @@ fn mixed_samples<T: Sample>(
         for (k, v) in px.iter_mut().enumerate() {
             let (near, far) = (v.to_unit(), b[i * c + k].to_unit());
             let mix = |near: f64, far: f64| (1.0 - share) * near + share * far;
-            *v = T::from_unit(if curved && Some(k) != alpha {
-                srgb_from_linear(mix(linear_from_srgb(near), linear_from_srgb(far)))
-            } else {
-                mix(near, far)
+            *v = T::from_unit(match curve.filter(|_| Some(k) != alpha) {
+                Some(curve) => curve.display(mix(curve.linear(near), curve.linear(far))),
+                None => mix(near, far),
             });
         }
     });

@@ -17,6 +17,50 @@ pub fn srgb_from_linear(v: f64) -> f64 {
     if v <= 0.003_130_8 { v * 12.92 } else { 1.055 * libm::pow(v, 1.0 / 2.4) - 0.055 }
 }
 
+/// sRGB to linear light and back, tabulated over `0..=1`: a power for every sample would take longer than
+/// what is done with it. The error is far below a step of 16 bits.
+#[derive(Debug)]
+pub struct SrgbTables {
+    linear: Vec<f64>,
+    /// Over the root: the curve is steep at black.
+    display: Vec<f64>,
+}
+
+impl SrgbTables {
+    const STEPS: usize = 1 << 14;
+
+    /// The tables, made once in a process.
+    pub fn get() -> &'static Self {
+        static TABLES: LazyLock<SrgbTables> = LazyLock::new(|| {
+            let table = |f: &dyn Fn(f64) -> f64| {
+                (0..SrgbTables::STEPS + 2).map(|i| f(i as f64 / SrgbTables::STEPS as f64)).collect()
+            };
+            SrgbTables {
+                linear: table(&linear_from_srgb),
+                display: table(&|root| srgb_from_linear(root * root)),
+            }
+        });
+        &TABLES
+    }
+
+    /// As [`linear_from_srgb`].
+    pub fn linear(&self, v: f64) -> f64 {
+        Self::between(&self.linear, v).unwrap_or_else(|| linear_from_srgb(v))
+    }
+
+    /// As [`srgb_from_linear`].
+    pub fn display(&self, v: f64) -> f64 {
+        Self::between(&self.display, v.sqrt()).unwrap_or_else(|| srgb_from_linear(v))
+    }
+
+    /// `None` outside `0..=1`.
+    fn between(table: &[f64], v: f64) -> Option<f64> {
+        let at = (0.0..=1.0).contains(&v).then_some(v * Self::STEPS as f64)?;
+        let i = at as usize;
+        Some(table[i] + (table[i + 1] - table[i]) * (at - i as f64))
+    }
+}
+
 /// Steps of the table of cube roots; linear interpolation then errs by less than 1e-5.
 const ROOT_STEPS: usize = 8192;
 
@@ -274,6 +318,18 @@ mod tests {
     fn lab(rgb: [u8; 3]) -> [f32; 3] {
         let px = rgb.map(|v| linear_from_srgb(f64::from(v) / 255.0) as f32);
         lab_from_linear(&LAB_CURVE, px)
+    }
+
+    #[test]
+    fn the_tables_agree_with_the_curves() {
+        const STEP: f64 = 0.05 / 65_535.0;
+        let tables = SrgbTables::get();
+        for i in 0..=100_000 {
+            let v = f64::from(i) / 100_000.0;
+            assert!((tables.linear(v) - linear_from_srgb(v)).abs() < STEP, "linear({v})");
+            assert!((tables.display(v) - srgb_from_linear(v)).abs() < STEP, "display({v})");
+        }
+        assert!((tables.display(tables.linear(4.0)) - 4.0).abs() < 1e-9);
     }
 
     #[test]

@@ -4,7 +4,7 @@
 use rayon::prelude::*;
 
 use crate::base::error::{Error, Result};
-use crate::image::color::{ColorModel, MatchSpace, linear_from_srgb, srgb_from_linear};
+use crate::image::color::{ColorModel, MatchSpace, SrgbTables};
 use crate::image::mask::Mask;
 use crate::image::picture::{Encoding, Picture, Sample, Samples};
 use crate::signal::lowpass::LowPass;
@@ -70,7 +70,7 @@ pub fn run(photo: &Picture, usable: Option<&Mask>, sigma: f64) -> Result<Flat> {
     let pixels = model.averaging_pixels(photo);
     let low = LowPass::new(&pixels, (h, w), usable, sigma);
     // Sums row by row, and the rows in order: the same for any number of threads.
-    let per_row = |value: &(dyn Fn(usize) -> [f64; 3] + Sync)| -> [f64; 3] {
+    let means = |value: &(dyn Fn(usize) -> [f64; 3] + Sync), n: f64| -> [f64; 3] {
         let row = |y: usize| {
             let mut sum = [0.0; 3];
             for i in (y * w..(y + 1) * w).filter(|&i| counts(i)) {
@@ -79,39 +79,33 @@ pub fn run(photo: &Picture, usable: Option<&Mask>, sigma: f64) -> Result<Flat> {
             sum
         };
         let rows: Vec<[f64; 3]> = (0..h).into_par_iter().map(row).collect();
-        std::array::from_fn(|k| rows.iter().map(|row| row[k]).sum())
+        std::array::from_fn(|k| rows.iter().map(|row| row[k]).sum::<f64>() / n)
     };
     let n = (0..h * w).filter(|&i| counts(i)).count().max(1) as f64;
-    let mean = per_row(&|i| pixels[i].map(f64::from)).map(|sum| sum / n);
-    let factor = |i: usize| -> [f64; 3] {
-        let Some(low) = low.at(i / w, i % w) else { return [1.0; 3] };
-        std::array::from_fn(|k| {
-            if mean[k] > 0.0 {
-                mean[k] / low[k].clamp(mean[k] / LIMIT, mean[k] * LIMIT)
-            } else {
-                1.0
+    let mean = means(&|i| pixels[i].map(f64::from), n);
+    // What light is multiplied by, before the means are what they were.
+    let mut gains = vec![[1.0; 3]; h * w];
+    gains.par_chunks_mut(w).enumerate().for_each(|(y, gains)| {
+        let low = low.row(y);
+        for (x, gain) in gains.iter_mut().enumerate() {
+            let Some(low) = low.at(x) else { continue };
+            for k in (0..3).filter(|&k| mean[k] > 0.0) {
+                gain[k] = mean[k] / low[k].clamp(mean[k] / LIMIT, mean[k] * LIMIT);
             }
-        })
-    };
-    let flat_mean = per_row(&|i| {
-        let factor = factor(i);
-        std::array::from_fn(|k| f64::from(pixels[i][k]) * factor[k])
+        }
     });
+    let flat_mean = means(&|i| std::array::from_fn(|k| f64::from(pixels[i][k]) * gains[i][k]), n);
     let keep: [f64; 3] =
-        std::array::from_fn(|k| if flat_mean[k] > 0.0 { mean[k] * n / flat_mean[k] } else { 1.0 });
-    let gain = |i: usize| -> [f64; 3] {
-        let factor = factor(i);
-        std::array::from_fn(|k| factor[k] * keep[k])
-    };
+        std::array::from_fn(|k| if flat_mean[k] > 0.0 { mean[k] / flat_mean[k] } else { 1.0 });
+    gains.par_iter_mut().for_each(|gain| (0..3).for_each(|k| gain[k] *= keep[k]));
 
     let alpha = photo.alpha_channel();
-    let curve = Curve::new(photo.encoding);
+    let curve = (photo.encoding == Encoding::Srgb).then(SrgbTables::get);
     let (samples, clipped) =
-        with_samples!(photo.samples(), v => multiplied(v, (w, c), alpha, &curve, &gain, &counts));
+        with_samples!(photo.samples(), v => multiplied(v, (w, c), alpha, curve, &gains, &counts));
     let range = |i: usize| {
-        gain(i)
-            .into_iter()
-            .fold((f64::MAX, 0.0), |(low, high): (f64, f64), g| (low.min(g), high.max(g)))
+        let ends = |(low, high): (f64, f64), &g: &f64| (low.min(g), high.max(g));
+        gains[i].iter().fold((f64::MAX, 0.0), ends)
     };
     let factors = (0..h * w)
         .into_par_iter()
@@ -128,17 +122,21 @@ fn multiplied<T: Sample>(
     v: &[T],
     (w, c): (usize, usize),
     alpha: Option<usize>,
-    curve: &Curve,
-    gain: &(impl Fn(usize) -> [f64; 3] + Sync),
+    curve: Option<&SrgbTables>,
+    gains: &[[f64; 3]],
     counts: &(impl Fn(usize) -> bool + Sync),
 ) -> (Samples, usize) {
     let mut out = v.to_vec();
     let row = |(y, row): (usize, &mut [T])| {
         let mut clipped = 0;
         for (x, px) in row.chunks_exact_mut(c).enumerate() {
-            let gain = gain(y * w + x);
+            let gain = gains[y * w + x];
             for k in (0..c).filter(|&k| Some(k) != alpha) {
-                let value = curve.display(curve.linear(px[k].to_unit()) * gain[k]);
+                let value = px[k].to_unit();
+                let value = match curve {
+                    None => value * gain[k],
+                    Some(curve) => curve.display(curve.linear(value) * gain[k]),
+                };
                 let sample = T::from_unit(value);
                 // A half float has an end; hidden pixels may be anything.
                 if sample.to_unit().is_finite() {
@@ -153,66 +151,9 @@ fn multiplied<T: Sample>(
     (T::wrap(out), clipped)
 }
 
-/// An encoding's way to linear light and back, tabulated over `0..=1`: a power a sample would take
-/// longer than the tile. The error is far below a step of 16 bits.
-struct Curve {
-    linear: Vec<f64>,
-    display: Vec<f64>,
-}
-
-impl Curve {
-    const STEPS: usize = 1 << 14;
-
-    fn new(encoding: Encoding) -> Self {
-        let table = |f: &dyn Fn(f64) -> f64| {
-            let n = if encoding == Encoding::Srgb { Self::STEPS + 2 } else { 0 };
-            (0..n).map(|i| f(i as f64 / Self::STEPS as f64)).collect()
-        };
-        // Over the root: the curve is steep at black.
-        Self {
-            linear: table(&linear_from_srgb),
-            display: table(&|root| srgb_from_linear(root * root)),
-        }
-    }
-
-    fn linear(&self, v: f64) -> f64 {
-        if self.linear.is_empty() {
-            v
-        } else {
-            interpolated(&self.linear, v).unwrap_or_else(|| linear_from_srgb(v))
-        }
-    }
-
-    fn display(&self, v: f64) -> f64 {
-        if self.display.is_empty() {
-            return v;
-        }
-        interpolated(&self.display, v.sqrt()).unwrap_or_else(|| srgb_from_linear(v))
-    }
-}
-
-/// `None` outside `0..=1`.
-fn interpolated(table: &[f64], v: f64) -> Option<f64> {
-    let at = (0.0..=1.0).contains(&v).then_some(v * Curve::STEPS as f64)?;
-    let i = at as usize;
-    Some(table[i] + (table[i + 1] - table[i]) * (at - i as f64))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_tables_agree_with_the_curves() {
-        const STEP: f64 = 0.05 / 65_535.0;
-        let curve = Curve::new(Encoding::Srgb);
-        for i in 0..=100_000 {
-            let v = f64::from(i) / 100_000.0;
-            assert!((curve.linear(v) - linear_from_srgb(v)).abs() < STEP, "linear({v})");
-            assert!((curve.display(v) - srgb_from_linear(v)).abs() < STEP, "display({v})");
-        }
-        assert!((curve.display(curve.linear(4.0)) - 4.0).abs() < 1e-9);
-    }
 
     #[test]
     fn data_is_no_light() {

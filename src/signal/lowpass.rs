@@ -82,23 +82,47 @@ impl LowPass {
         Self { side, rows, cols, cells: blurred.par_iter().enumerate().map(fit).collect() }
     }
 
-    /// The value at pixel (`y`, `x`); `None` if no usable pixel is in reach.
-    pub fn at(&self, y: usize, x: usize) -> Option<[f64; 3]> {
-        // Linear between the middles of the cells, and on beyond the outermost.
-        let place = |p: usize, n: usize| {
-            let at = (p as f64 + 0.5) / self.side as f64 - 0.5;
-            let low = at.clamp(0.0, n.saturating_sub(2) as f64) as usize;
-            (low, (low + 1).min(n - 1), at - low as f64)
-        };
-        let ((y0, y1, fy), (x0, x1, fx)) = (place(y, self.rows), place(x, self.cols));
-        let cell = |y: usize, x: usize| self.cells[y * self.cols + x];
-        let corners = [cell(y0, x0)?, cell(y0, x1)?, cell(y1, x0)?, cell(y1, x1)?];
-        Some(std::array::from_fn(|k| {
-            let [a, b, c, d] = corners.map(|v| v[k]);
-            let (top, bottom) = (a + (b - a) * fx, c + (d - c) * fx);
-            top + (bottom - top) * fy
-        }))
+    /// The values of a row of pixels.
+    pub fn row(&self, y: usize) -> LowPassRow {
+        let inverse = 1.0 / self.side as f64;
+        let (y0, y1, t) = place(y, self.rows, inverse);
+        let line = |y: usize| &self.cells[y * self.cols..][..self.cols];
+        let cells =
+            line(y0).iter().zip(line(y1)).map(|(a, b)| Some(between((*a)?, (*b)?, t))).collect();
+        LowPassRow { cells, inverse }
     }
+}
+
+/// The low frequencies of a row of pixels.
+#[derive(Debug)]
+pub struct LowPassRow {
+    /// Between those above and below.
+    cells: Vec<Option<[f64; 3]>>,
+    /// Cells to a pixel.
+    inverse: f64,
+}
+
+impl LowPassRow {
+    /// The value at pixel `x`; `None` if no usable pixel is in reach.
+    #[inline]
+    pub fn at(&self, x: usize) -> Option<[f64; 3]> {
+        let (x0, x1, t) = place(x, self.cells.len(), self.inverse);
+        Some(between(self.cells[x0]?, self.cells[x1]?, t))
+    }
+}
+
+/// The cells before and after pixel `p`, and where between their middles it lies; beyond the outermost the
+/// line goes on.
+#[inline]
+fn place(p: usize, n: usize, inverse: f64) -> (usize, usize, f64) {
+    let at = (p as f64 + 0.5) * inverse - 0.5;
+    let low = at.clamp(0.0, n.saturating_sub(2) as f64) as usize;
+    (low, (low + 1).min(n - 1), at - low as f64)
+}
+
+#[inline]
+fn between(a: [f64; 3], b: [f64; 3], t: f64) -> [f64; 3] {
+    std::array::from_fn(|k| a[k] + (b[k] - a[k]) * t)
 }
 
 /// Blurs `rows` x `cols` cells along the columns' direction and transposes them.
@@ -192,7 +216,7 @@ mod tests {
         for sigma in [4.0, 9.0, 17.0] {
             let low = LowPass::new(&pixels, (h, w), Some(&usable), sigma);
             for (y, x) in [(0, 0), (3, 58), (20, 15), (25, 30), (49, 60), (14, 9)] {
-                let got = low.at(y, x).expect("in reach");
+                let got = low.row(y).at(x).expect("in reach");
                 let want = naive(&pixels, (h, w), &usable, sigma, (y, x)).expect("in reach");
                 for k in 0..3 {
                     let off = (got[k] - want[k]).abs();
@@ -209,7 +233,7 @@ mod tests {
         let pixels: Vec<[f32; 3]> = (0..h * w).map(|i| [slope(i / w, i % w) as f32; 3]).collect();
         let low = LowPass::new(&pixels, (h, w), Some(&holes(h, w)), 12.0);
         for i in 0..h * w {
-            let off = low.at(i / w, i % w).expect("in reach")[1] - slope(i / w, i % w);
+            let off = low.row(i / w).at(i % w).expect("in reach")[1] - slope(i / w, i % w);
             assert!(off.abs() < 1e-5, "at {}, {}: {off}", i / w, i % w);
         }
     }
@@ -217,6 +241,6 @@ mod tests {
     #[test]
     fn nothing_usable_gives_nothing() {
         let low = LowPass::new(&[[1.0; 3]; 64], (8, 8), Some(&[false; 64]), 2.0);
-        assert!(low.at(3, 3).is_none());
+        assert!(low.row(3).at(3).is_none());
     }
 }

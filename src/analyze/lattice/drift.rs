@@ -2,7 +2,8 @@
 
 use rayon::prelude::*;
 
-use crate::search::patch::MatchImage;
+use crate::base::ctx::Simd;
+use crate::search::patch::{Kernel, MatchImage, WithKernel, squares, with_kernel};
 use crate::signal::basis::{Basis, Vector, area, coefficients, combined};
 
 /// Square roots of a cell's area, in pixels, at which cells are compared, coarse to fine, and by how many
@@ -40,8 +41,9 @@ impl Drift {
     /// mean is then made of the moved cells, and so on.
     ///
     /// # Determinism
-    /// Sums of integers; same bytes for any thread count.
+    /// Sums of integers; same bytes for any thread count and SIMD level.
     pub fn measured(
+        simd: Simd,
         basis: Basis,
         (height, width): (usize, usize),
         mut look: impl FnMut(f64) -> MatchImage,
@@ -67,7 +69,7 @@ impl Drift {
             let scale =
                 [image.width() as f64 / width as f64, image.height() as f64 / height as f64];
             for _ in 0..ROUNDS {
-                drift.improve(basis, &image, scale, reach, OUTLIER * root);
+                drift.improve(simd, basis, &image, scale, reach, OUTLIER * root);
             }
         }
         drift
@@ -99,6 +101,7 @@ impl Drift {
     /// One round: the mean cell, and every cell's place against it.
     fn improve(
         &mut self,
+        simd: Simd,
         basis: Basis,
         image: &MatchImage,
         scale: [f64; 2],
@@ -138,16 +141,11 @@ impl Drift {
             let n = whole.len() as u32;
             mean.iter_mut().zip(sums).for_each(|(mean, sum)| *mean = ((sum + n / 2) / n) as u8);
         });
-        let unlike = |x: i64, y: i64| -> u64 {
-            let rows = mean.chunks_exact(4 * w).enumerate();
-            rows.map(|(dy, mean)| u64::from(squared(mean, row(y + dy as i64, x)))).sum()
-        };
         let found = |corner: &Option<[i64; 2]>| {
-            let [x, y] = (*corner)?;
+            let corner = (*corner)?;
             let side = (2 * reach + 1) as usize;
-            let cost =
-                |i: usize| unlike(x + (i % side) as i64 - reach, y + (i / side) as i64 - reach);
-            let costs: Vec<u64> = (0..side * side).map(cost).collect();
+            let costs =
+                with_kernel(simd, 1, Costs { image, mean: &mean, row: 4 * w, corner, reach });
             let best = (0..costs.len()).min_by_key(|&i| costs[i])?;
             let (by, bx) = (best / side, best % side);
             // Beyond what was looked at there may be better: it is not known.
@@ -207,10 +205,35 @@ fn settled(moved: &[Option<Vector>], columns: usize, outlier: f64) -> Vec<Vector
     (0..moved.len()).into_par_iter().map(one).collect()
 }
 
-/// The sum of squared differences of codes.
-fn squared(a: &[u8], b: &[u8]) -> u32 {
-    let square = |(&a, &b): (&u8, &u8)| u32::from(a.abs_diff(b)).pow(2);
-    a.iter().zip(b).map(square).sum()
+/// How unlike the mean cell (codes, `row` a row) the picture is around a corner: the sum of squared differences for
+/// every displacement by at most `reach` rows and columns, row by row.
+struct Costs<'a> {
+    image: &'a MatchImage,
+    mean: &'a [u8],
+    row: usize,
+    corner: [i64; 2],
+    reach: i64,
+}
+
+impl WithKernel for Costs<'_> {
+    type Output = Vec<u64>;
+
+    #[inline(always)]
+    fn run<K: Kernel>(self, _: K) -> Vec<u64> {
+        let Self { image, mean, row, corner: [x, y], reach } = self;
+        let mut costs = Vec::new();
+        for dy in -reach..=reach {
+            for dx in -reach..=reach {
+                let mut cost = 0;
+                for (i, mean) in mean.chunks_exact(row).enumerate() {
+                    let at = image.at((y + dy) as usize + i, (x + dx) as usize);
+                    cost += squares(mean, image.codes_from(at, row)) as u64;
+                }
+                costs.push(cost);
+            }
+        }
+        costs
+    }
 }
 
 #[cfg(test)]
@@ -250,7 +273,7 @@ mod tests {
 
     #[test]
     fn rows_of_cells_are_found_where_they_lie() {
-        let drift = Drift::measured(BASIS, (240, 264), |scale| {
+        let drift = Drift::measured(Simd::default(), BASIS, (240, 264), |scale| {
             assert_eq!(scale, 1.0, "cells as small as these are looked at as they are");
             photo(240, 264)
         });

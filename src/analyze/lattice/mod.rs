@@ -148,23 +148,33 @@ pub fn normalized(
     let ok = |i: usize| usable.as_ref().is_none_or(|u| u[i]);
     let sigma = WINDOW * size.0.min(size.1) as f64;
     let mean = LowPass::new(&small, size, usable.as_deref(), sigma);
-    let centered = |(i, px): (usize, &[f32; 3])| match mean.at(i / size.1, i % size.1) {
-        Some(mean) if ok(i) => std::array::from_fn(|k| (f64::from(px[k]) - mean[k]) as f32),
-        _ => [0.0; 3],
-    };
-    let centered: Vec<[f32; 3]> = small.par_iter().enumerate().map(centered).collect();
+    let mut centered = small;
+    centered.par_chunks_mut(size.1).enumerate().for_each(|(y, row)| {
+        let mean = mean.row(y);
+        for (x, px) in row.iter_mut().enumerate() {
+            *px = match mean.at(x) {
+                Some(mean) if ok(y * size.1 + x) => {
+                    std::array::from_fn(|k| (f64::from(px[k]) - mean[k]) as f32)
+                }
+                _ => [0.0; 3],
+            };
+        }
+    });
     let power: Vec<[f32; 3]> =
         centered.par_iter().map(|d| [d.iter().map(|v| v * v).sum(), 0.0, 0.0]).collect();
     let count = (0..power.len()).filter(|&i| ok(i)).count().max(1);
     let whole = power.iter().map(|p| f64::from(p[0])).sum::<f64>() / count as f64;
     let floor = FAINT * FAINT * whole;
     let local = LowPass::new(&power, size, usable.as_deref(), sigma);
-    let even = |(i, d): (usize, &[f32; 3])| {
-        let power = local.at(i / size.1, i % size.1).map_or(0.0, |p| p[0]).max(floor);
-        let factor = if power > 0.0 { power.sqrt().recip() } else { 0.0 };
-        d.map(|v| (f64::from(v) * factor) as f32)
-    };
-    let even: Vec<[f32; 3]> = centered.par_iter().enumerate().map(even).collect();
+    let mut even = centered;
+    even.par_chunks_mut(size.1).enumerate().for_each(|(y, row)| {
+        let local = local.row(y);
+        for (x, px) in row.iter_mut().enumerate() {
+            let power = local.at(x).map_or(0.0, |p| p[0]).max(floor);
+            let factor = if power > 0.0 { power.sqrt().recip() } else { 0.0 };
+            *px = px.map(|v| (f64::from(v) * factor) as f32);
+        }
+    });
     let planes = (0..3).map(|k| even.iter().map(|px| px[k]).collect::<Vec<f32>>());
     let energy = |plane: &[f32]| plane.iter().map(|&v| f64::from(v).powi(2)).sum::<f64>();
     let energies: Vec<f64> = planes.clone().map(|plane| energy(&plane)).collect();

@@ -1,6 +1,7 @@
 //! [`Exemplar`]: what pieces are taken from.
 
 use crate::analyze::lattice::drift::Drift;
+use crate::base::ctx::Simd;
 use crate::image::color::ColorModel;
 use crate::image::mask::Mask;
 use crate::image::picture::Picture;
@@ -23,7 +24,12 @@ pub struct Exemplar {
 impl Exemplar {
     /// The photo, and where it may be used. With a lattice it is found out how far each of its cells
     /// lies beside its place, and patches are taken from where the cell is.
-    pub fn new(photo: &Picture, mask: Option<&Mask>, straightened: Option<Basis>) -> Self {
+    pub fn new(
+        simd: Simd,
+        photo: &Picture,
+        mask: Option<&Mask>,
+        straightened: Option<Basis>,
+    ) -> Self {
         let size = (photo.height(), photo.width());
         let model = ColorModel::new(photo);
         let pixels = model.averaging_pixels(photo);
@@ -31,7 +37,7 @@ impl Exemplar {
         let codes = Codes::covering(&[(&pixels, usable)], model.space());
         let image = codes.image(&pixels, size, model.space());
         let drift = straightened.map_or_else(Drift::none, |basis| {
-            Drift::measured(basis, size, |scale| {
+            Drift::measured(simd, basis, size, |scale| {
                 let to = |n: usize| (n as f64 * scale).round().max(1.0) as usize;
                 let to = (to(size.0), to(size.1));
                 codes.image(&resized(&pixels, size, to), to, model.space())

@@ -4,7 +4,7 @@ use crate::base::ctx::Simd;
 use crate::method::rsgf::Matching;
 use crate::method::rsgf::grid::{Lenses, Side};
 use crate::method::rsgf::places::Offset;
-use crate::search::patch::{Kernel, MatchImage, WithKernel, with_kernel};
+use crate::search::patch::{Kernel, MatchImage, WithKernel, squares, with_kernel};
 
 /// How many of the places are looked at more closely. More finds a little better ones.
 pub(super) const CLOSER: usize = 8;
@@ -97,7 +97,7 @@ impl WithKernel for Differences<'_> {
             for (y, x, run) in &self.frame.runs {
                 let wanted = &self.frame.codes[run.clone()];
                 let at = self.source.at(place[0] as usize + y, place[1] as usize + x);
-                cost += u64::from(squared(wanted, self.source.codes_from(at, wanted.len())));
+                cost += squares(wanted, self.source.codes_from(at, wanted.len())) as u64;
                 if self.cut_off && cost >= least {
                     break;
                 }
@@ -107,17 +107,6 @@ impl WithKernel for Differences<'_> {
         }
         costs
     }
-}
-
-/// The sum of squared differences of codes.
-#[inline(always)]
-fn squared(a: &[u8], b: &[u8]) -> u32 {
-    let mut sum = 0;
-    for (&a, &b) in a.iter().zip(b) {
-        let d = i32::from(i16::from(a) - i16::from(b));
-        sum += (d * d) as u32;
-    }
-    sum
 }
 
 /// One less the normalized cross-correlation at every place, the hole left out (paper eq. 4 and sec.

@@ -2,13 +2,16 @@
 
 use std::collections::VecDeque;
 
-/// What flow arcs between neighbouring pixels still take.
+/// What flow arcs between neighbouring pixels still take. Around the picture lie pixels that nothing leads to:
+/// every one of the picture has four neighbours.
 #[derive(Debug)]
 pub(super) struct Flow {
     height: usize,
     width: usize,
+    /// From a pixel to the next in every direction, wrapping.
+    steps: [usize; 4],
     /// From a pixel to the one on the right, below, left, above.
-    pub(super) arcs: [Vec<i32>; 4],
+    pub(super) arcs: Vec<[i32; 4]>,
     /// The flow that a pixel still takes from the source (positive) or gives to the sink (negative).
     pub(super) terminal: Vec<i32>,
 }
@@ -29,48 +32,49 @@ impl Flow {
     pub(super) const DIRECTIONS: [Direction; 4] = [0, 1, 2, 3];
 
     pub(super) fn new(height: usize, width: usize) -> Self {
-        let arcs = std::array::from_fn(|_| vec![0; height * width]);
-        Self { height, width, arcs, terminal: vec![0; height * width] }
+        // What lies on the right of a row lies on the left of the next, too.
+        let stride = width + 1;
+        let n = (height + 2) * stride;
+        let steps = [1, stride, 1usize.wrapping_neg(), stride.wrapping_neg()];
+        Self { height, width, steps, arcs: vec![[0; 4]; n], terminal: vec![0; n] }
     }
 
-    /// The pixel in a direction, if there is one.
+    /// The index of a pixel.
+    pub(super) fn at(&self, y: usize, x: usize) -> usize {
+        (y + 1) * (self.width + 1) + x
+    }
+
+    /// The pixel in a direction.
     #[inline]
-    pub(super) fn next(&self, p: usize, d: Direction) -> Option<usize> {
-        match d {
-            0 => (p % self.width + 1 < self.width).then_some(p + 1),
-            1 => (p + self.width < self.height * self.width).then_some(p + self.width),
-            2 => (!p.is_multiple_of(self.width)).then(|| p - 1),
-            _ => p.checked_sub(self.width),
-        }
+    pub(super) fn next(&self, p: usize, d: Direction) -> usize {
+        p.wrapping_add(self.steps[d as usize])
     }
 
     /// The source's side of a least cut, by maximum flow with two search trees (Boykov and Kolmogorov
     /// 2004).
     pub(super) fn solve(mut self) -> Vec<bool> {
-        let n = self.height * self.width;
+        let n = self.terminal.len();
         let mut trees = Trees {
-            parent: vec![FREE; n],
-            is_sink: vec![false; n],
-            depth: vec![0; n],
-            stamp: vec![0; n],
+            nodes: vec![Node { parent: FREE, is_sink: false, waits: false, depth: 0, stamp: 0 }; n],
             active: VecDeque::new(),
-            waits: vec![false; n],
             orphans: VecDeque::new(),
             now: 0,
         };
         for p in 0..n {
             if self.terminal[p] != 0 {
-                trees.parent[p] = ROOT;
-                trees.is_sink[p] = self.terminal[p] < 0;
-                trees.depth[p] = 1;
+                let node = &mut trees.nodes[p];
+                node.parent = ROOT;
+                node.is_sink = self.terminal[p] < 0;
+                node.depth = 1;
                 trees.wait(p);
             }
         }
         while let Some(&p) = trees.active.front() {
-            let bridge = if trees.parent[p] == FREE { None } else { self.grow(&mut trees, p) };
+            let bridge =
+                if trees.nodes[p].parent == FREE { None } else { self.grow(&mut trees, p) };
             let Some((p, d, q)) = bridge else {
                 trees.active.pop_front();
-                trees.waits[p] = false;
+                trees.nodes[p].waits = false;
                 continue;
             };
             trees.now += 1;
@@ -82,46 +86,48 @@ impl Flow {
         self.reached()
     }
 
-    /// What can still be reached from the source: the inside.
+    /// What can still be reached from the source: the inside, row by row.
     fn reached(&self) -> Vec<bool> {
         let mut inside: Vec<bool> = self.terminal.iter().map(|&t| t > 0).collect();
         let mut open: Vec<usize> = (0..inside.len()).filter(|&p| inside[p]).collect();
         while let Some(p) = open.pop() {
             for d in Self::DIRECTIONS {
-                let Some(q) = self.next(p, d) else { continue };
-                if self.arcs[d as usize][p] > 0 && !inside[q] {
+                let q = self.next(p, d);
+                if self.arcs[p][d as usize] > 0 && !inside[q] {
                     inside[q] = true;
                     open.push(q);
                 }
             }
         }
-        inside
+        (0..self.height).flat_map(|y| inside[self.at(y, 0)..][..self.width].to_vec()).collect()
     }
 
     /// Lets the tree grow around active pixel `p` until it touches the other one: the arc from the
     /// source's tree to the sink's.
     fn grow(&self, trees: &mut Trees, p: usize) -> Option<(usize, Direction, usize)> {
-        let is_sink = trees.is_sink[p];
+        let is_sink = trees.nodes[p].is_sink;
         for d in Self::DIRECTIONS {
-            let Some(q) = self.next(p, d) else { continue };
+            let q = self.next(p, d);
             let open =
-                if is_sink { self.arcs[(d ^ 2) as usize][q] } else { self.arcs[d as usize][p] };
+                if is_sink { self.arcs[q][(d ^ 2) as usize] } else { self.arcs[p][d as usize] };
             if open <= 0 {
                 continue;
             }
-            if trees.parent[q] == FREE {
-                trees.parent[q] = d ^ 2;
-                trees.is_sink[q] = is_sink;
-                trees.depth[q] = trees.depth[p] + 1;
-                trees.stamp[q] = trees.stamp[p];
+            if trees.nodes[q].parent == FREE {
+                trees.nodes[q].parent = d ^ 2;
+                trees.nodes[q].is_sink = is_sink;
+                trees.nodes[q].depth = trees.nodes[p].depth + 1;
+                trees.nodes[q].stamp = trees.nodes[p].stamp;
                 trees.wait(q);
-            } else if trees.is_sink[q] != is_sink {
+            } else if trees.nodes[q].is_sink != is_sink {
                 return Some(if is_sink { (q, d ^ 2, p) } else { (p, d, q) });
-            } else if trees.stamp[q] <= trees.stamp[p] && trees.depth[q] > trees.depth[p] + 1 {
+            } else if trees.nodes[q].stamp <= trees.nodes[p].stamp
+                && trees.nodes[q].depth > trees.nodes[p].depth + 1
+            {
                 // A shorter way to the root.
-                trees.parent[q] = d ^ 2;
-                trees.depth[q] = trees.depth[p] + 1;
-                trees.stamp[q] = trees.stamp[p];
+                trees.nodes[q].parent = d ^ 2;
+                trees.nodes[q].depth = trees.nodes[p].depth + 1;
+                trees.nodes[q].stamp = trees.nodes[p].stamp;
             }
         }
         None
@@ -129,16 +135,16 @@ impl Flow {
 
     /// Pushes what the path over this arc takes.
     fn augment(&mut self, trees: &mut Trees, (p, d, q): (usize, Direction, usize)) {
-        let mut most = self.arcs[d as usize][p];
+        let mut most = self.arcs[p][d as usize];
         for (end, is_sink) in [(p, false), (q, true)] {
             let mut at = end;
-            while trees.parent[at] != ROOT {
-                let up = trees.parent[at];
-                let next = self.next(at, up).unwrap_or(at);
+            while trees.nodes[at].parent != ROOT {
+                let up = trees.nodes[at].parent;
+                let next = self.next(at, up);
                 most = most.min(if is_sink {
-                    self.arcs[up as usize][at]
+                    self.arcs[at][up as usize]
                 } else {
-                    self.arcs[(up ^ 2) as usize][next]
+                    self.arcs[next][(up ^ 2) as usize]
                 });
                 at = next;
             }
@@ -147,44 +153,44 @@ impl Flow {
         self.push(p, d, q, most);
         for (end, is_sink) in [(p, false), (q, true)] {
             let mut at = end;
-            while trees.parent[at] != ROOT {
-                let up = trees.parent[at];
-                let next = self.next(at, up).unwrap_or(at);
+            while trees.nodes[at].parent != ROOT {
+                let up = trees.nodes[at].parent;
+                let next = self.next(at, up);
                 let left = if is_sink {
                     self.push(at, up, next, most);
-                    self.arcs[up as usize][at]
+                    self.arcs[at][up as usize]
                 } else {
                     self.push(next, up ^ 2, at, most);
-                    self.arcs[(up ^ 2) as usize][next]
+                    self.arcs[next][(up ^ 2) as usize]
                 };
                 if left == 0 {
-                    trees.parent[at] = ORPHAN;
+                    trees.nodes[at].parent = ORPHAN;
                     trees.orphans.push_back(at);
                 }
                 at = next;
             }
             self.terminal[at] += if is_sink { most } else { -most };
             if self.terminal[at] == 0 {
-                trees.parent[at] = ORPHAN;
+                trees.nodes[at].parent = ORPHAN;
                 trees.orphans.push_back(at);
             }
         }
     }
 
     fn push(&mut self, p: usize, d: Direction, q: usize, flow: i32) {
-        self.arcs[d as usize][p] -= flow;
-        self.arcs[(d ^ 2) as usize][q] += flow;
+        self.arcs[p][d as usize] -= flow;
+        self.arcs[q][(d ^ 2) as usize] += flow;
     }
 
     /// Finds a new parent in its tree for a pixel, or sets it free.
     fn adopt(&self, trees: &mut Trees, p: usize) {
-        let is_sink = trees.is_sink[p];
+        let is_sink = trees.nodes[p].is_sink;
         let mut best: Option<(u32, Direction)> = None;
         for d in Self::DIRECTIONS {
-            let Some(q) = self.next(p, d) else { continue };
+            let q = self.next(p, d);
             let open =
-                if is_sink { self.arcs[d as usize][p] } else { self.arcs[(d ^ 2) as usize][q] };
-            if open <= 0 || trees.is_sink[q] != is_sink || trees.parent[q] >= ORPHAN {
+                if is_sink { self.arcs[p][d as usize] } else { self.arcs[q][(d ^ 2) as usize] };
+            if open <= 0 || trees.nodes[q].is_sink != is_sink || trees.nodes[q].parent >= ORPHAN {
                 continue;
             }
             if let Some(depth) = self.depth(trees, q)
@@ -194,24 +200,24 @@ impl Flow {
             }
         }
         if let Some((depth, d)) = best {
-            trees.parent[p] = d;
-            trees.depth[p] = depth + 1;
-            trees.stamp[p] = trees.now;
+            trees.nodes[p].parent = d;
+            trees.nodes[p].depth = depth + 1;
+            trees.nodes[p].stamp = trees.now;
             return;
         }
-        trees.parent[p] = FREE;
+        trees.nodes[p].parent = FREE;
         for d in Self::DIRECTIONS {
-            let Some(q) = self.next(p, d) else { continue };
-            if trees.parent[q] == FREE || trees.is_sink[q] != is_sink {
+            let q = self.next(p, d);
+            if trees.nodes[q].parent == FREE || trees.nodes[q].is_sink != is_sink {
                 continue;
             }
             let open =
-                if is_sink { self.arcs[d as usize][p] } else { self.arcs[(d ^ 2) as usize][q] };
+                if is_sink { self.arcs[p][d as usize] } else { self.arcs[q][(d ^ 2) as usize] };
             if open > 0 {
                 trees.wait(q);
             }
-            if trees.parent[q] == d ^ 2 {
-                trees.parent[q] = ORPHAN;
+            if trees.nodes[q].parent == d ^ 2 {
+                trees.nodes[q].parent = ORPHAN;
                 trees.orphans.push_back(q);
             }
         }
@@ -221,52 +227,59 @@ impl Flow {
     fn depth(&self, trees: &mut Trees, p: usize) -> Option<u32> {
         let (mut at, mut steps) = (p, 0);
         let root = loop {
-            if trees.stamp[at] == trees.now {
-                break steps + trees.depth[at];
+            if trees.nodes[at].stamp == trees.now {
+                break steps + trees.nodes[at].depth;
             }
-            match trees.parent[at] {
+            match trees.nodes[at].parent {
                 ROOT => {
-                    trees.stamp[at] = trees.now;
-                    trees.depth[at] = 1;
+                    trees.nodes[at].stamp = trees.now;
+                    trees.nodes[at].depth = 1;
                     break steps + 1;
                 }
                 ORPHAN | FREE => return None,
-                up => at = self.next(at, up)?,
+                up => at = self.next(at, up),
             }
             steps += 1;
         };
         // What was walked is known from now on.
         let (mut at, mut depth) = (p, root);
-        while trees.stamp[at] != trees.now {
-            trees.stamp[at] = trees.now;
-            trees.depth[at] = depth;
+        while trees.nodes[at].stamp != trees.now {
+            trees.nodes[at].stamp = trees.now;
+            trees.nodes[at].depth = depth;
             depth -= 1;
-            at = self.next(at, trees.parent[at])?;
+            at = self.next(at, trees.nodes[at].parent);
         }
         Some(root)
     }
 }
 
+/// A pixel of a tree.
+#[derive(Debug, Clone)]
+struct Node {
+    /// The direction of the parent, or [`ROOT`], [`ORPHAN`], [`FREE`].
+    parent: u8,
+    is_sink: bool,
+    /// Whether it is one of the active.
+    waits: bool,
+    /// The distance from the root, as it was at the time of `stamp`.
+    depth: u32,
+    stamp: u32,
+}
+
 /// The trees of residual arcs that grow from the source and towards the sink.
 #[derive(Debug)]
 struct Trees {
-    /// The direction of the parent, or [`ROOT`], [`ORPHAN`], [`FREE`].
-    parent: Vec<u8>,
-    is_sink: Vec<bool>,
-    /// The distance from the root, as it was at the time of `stamp`.
-    depth: Vec<u32>,
-    stamp: Vec<u32>,
+    nodes: Vec<Node>,
     /// Pixels around which the tree may grow, each once.
     active: VecDeque<usize>,
-    waits: Vec<bool>,
     orphans: VecDeque<usize>,
     now: u32,
 }
 
 impl Trees {
     fn wait(&mut self, p: usize) {
-        if !self.waits[p] {
-            self.waits[p] = true;
+        if !self.nodes[p].waits {
+            self.nodes[p].waits = true;
             self.active.push_back(p);
         }
     }

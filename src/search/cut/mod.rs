@@ -73,13 +73,20 @@ impl Division {
         self.pairs[usize::from(below)][y * self.width + x] = costs;
     }
 
-    /// Every pixel, its neighbour on the right (0), then below (1), and their costs.
-    fn neighbors(&self) -> impl Iterator<Item = (usize, usize, usize, [i32; 3])> + '_ {
-        let n = self.height * self.width;
-        let right = (0..n).filter(|p| p % self.width + 1 < self.width).map(|p| (p, p + 1));
-        let below = (0..n.saturating_sub(self.width)).map(|p| (p, p + self.width));
-        let right = right.zip(std::iter::repeat(0)).chain(below.zip(std::iter::repeat(1)));
-        right.map(|((p, q), k)| (p, q, k, self.pairs[k][p]))
+    /// Calls `each` with all pixels (y, x) that have a neighbour on the right (0) or below (1), and the
+    /// costs of both.
+    fn each_pair(&self, mut each: impl FnMut((usize, usize), usize, [i32; 3])) {
+        for y in 0..self.height {
+            for x in 0..self.width {
+                let p = y * self.width + x;
+                if x + 1 < self.width {
+                    each((y, x), 0, self.pairs[0][p]);
+                }
+                if y + 1 < self.height {
+                    each((y, x), 1, self.pairs[1][p]);
+                }
+            }
+        }
     }
 
     /// The side of every pixel: whether it is inside. Of equally good divisions the one with the fewest
@@ -91,34 +98,38 @@ impl Division {
     /// The same with these pixels bound.
     fn solve_within(&self, bound: &[Option<bool>]) -> Vec<bool> {
         let mut flow = Flow::new(self.height, self.width);
-        for (p, cost) in self.outside.iter().enumerate() {
-            flow.terminal[p] += cost;
-        }
-        for (p, q, d, [none, other, own]) in self.neighbors() {
-            if bound[p].is_some() && bound[q].is_some() {
-                continue;
+        let width = self.width;
+        self.each_pair(|(y, x), d, [none, other, own]| {
+            let p = y * width + x;
+            if bound[p].is_some() && bound[p + [1, width][d]].is_some() {
+                return;
             }
             // E = none + (own - none) p - own q + (other + own - none) (1 - p) q, inside counting as 1.
+            let p = flow.at(y, x);
+            let q = flow.next(p, d as u8);
             flow.terminal[p] -= own - none;
             flow.terminal[q] += own;
-            flow.arcs[d ^ 2][q] += other + own - none;
-        }
-        // Those that touch nothing free are settled, and left out.
-        let touches = |p: usize| {
-            Flow::DIRECTIONS.iter().any(|&d| flow.next(p, d).is_some_and(|q| bound[q].is_none()))
-        };
-        let terminal = bound.iter().enumerate().map(|(p, bound)| match bound {
-            None => flow.terminal[p],
-            Some(inside) if touches(p) => {
-                if *inside {
-                    FORCED
-                } else {
-                    -FORCED
-                }
-            }
-            Some(_) => 0,
+            flow.arcs[q][d ^ 2] += other + own - none;
         });
-        flow.terminal = terminal.collect();
+        for y in 0..self.height {
+            for x in 0..width {
+                let (p, at) = (y * width + x, flow.at(y, x));
+                let Some(inside) = bound[p] else {
+                    flow.terminal[at] += self.outside[p];
+                    continue;
+                };
+                let touches = (x > 0 && bound[p - 1].is_none())
+                    || (x + 1 < width && bound[p + 1].is_none())
+                    || (y > 0 && bound[p - width].is_none())
+                    || (y + 1 < self.height && bound[p + width].is_none());
+                // Those that touch nothing free are settled, and left out.
+                flow.terminal[at] = match (touches, inside) {
+                    (false, _) => 0,
+                    (true, true) => FORCED,
+                    (true, false) => -FORCED,
+                };
+            }
+        }
         let inside = flow.solve();
         bound.iter().zip(inside).map(|(bound, inside)| bound.unwrap_or(inside)).collect()
     }
@@ -127,25 +138,26 @@ impl Division {
     /// the best among those that differ from it only where squares of both sides touch.
     pub fn solve_by_steps(&self, step: usize) -> Vec<bool> {
         let (rows, columns) = (self.height.div_ceil(step), self.width.div_ceil(step));
-        let square = |p: usize| p / self.width / step * columns + p % self.width / step;
+        let squares: Vec<usize> = (0..self.height)
+            .flat_map(|y| (0..self.width).map(move |x| y / step * columns + x / step))
+            .collect();
         let mut coarse = Self::new(rows, columns);
-        for (p, &cost) in self.outside.iter().enumerate() {
-            coarse.outside[square(p)] += cost;
-        }
-        for (p, bound) in self.bound.iter().enumerate() {
+        for ((&square, &cost), bound) in squares.iter().zip(&self.outside).zip(&self.bound) {
+            coarse.outside[square] += cost;
             if bound.is_some() {
-                coarse.bound[square(p)] = *bound;
+                coarse.bound[square] = *bound;
             }
         }
-        for (p, q, k, costs) in self.neighbors() {
-            let (a, b) = (square(p), square(q));
+        self.each_pair(|(y, x), k, costs| {
+            let p = y * self.width + x;
+            let (a, b) = (squares[p], squares[p + [1, self.width][k]]);
             if a == b {
                 coarse.outside[a] += costs[0];
             } else {
                 let pair = &mut coarse.pairs[k][a];
                 pair.iter_mut().zip(costs).for_each(|(sum, cost)| *sum += cost);
             }
-        }
+        });
         let found = coarse.solve();
         // A square among its like.
         let settled: Vec<bool> = (0..found.len())
@@ -156,11 +168,9 @@ impl Division {
                 around.all(|other| found[other] == found[q])
             })
             .collect();
-        let narrowed = |(p, bound): (usize, &Option<bool>)| {
-            let q = square(p);
-            bound.or(settled[q].then_some(found[q]))
-        };
-        let bound: Vec<Option<bool>> = self.bound.iter().enumerate().map(narrowed).collect();
+        let narrowed =
+            |(bound, &q): (&Option<bool>, &usize)| bound.or(settled[q].then_some(found[q]));
+        let bound: Vec<Option<bool>> = self.bound.iter().zip(&squares).map(narrowed).collect();
         self.solve_within(&bound)
     }
 }

@@ -11,7 +11,7 @@ pub mod codes;
 mod scalar;
 mod simd;
 
-pub use scalar::distance_squared;
+pub use scalar::{distance_squared, squares};
 
 use crate::base::ctx::Simd;
 

@@ -58,10 +58,16 @@ impl Kernel for Scalar {
     }
 }
 
-/// Sum of the squared differences.
-#[inline]
-fn squares(a: &[u8], b: &[u8]) -> i32 {
-    a.iter().zip(b).map(|(&a, &b)| (a as i32 - b as i32).pow(2)).sum()
+/// Sum of the squared differences of as many codes as both have. In a [`WithKernel`](super::WithKernel) it is
+/// compiled for its instruction set.
+#[inline(always)]
+pub fn squares(a: &[u8], b: &[u8]) -> i32 {
+    let mut sum = 0;
+    for (&a, &b) in a.iter().zip(b) {
+        let d = i32::from(i16::from(a) - i16::from(b));
+        sum += d * d;
+    }
+    sum
 }
 
 /// Squared distance of two patches by its definition: the sum over rows, columns and channels of

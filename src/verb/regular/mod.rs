@@ -165,7 +165,12 @@ impl<'a> RegularMaker<'a> {
         let flat = flattened(ctx, photo, usable.as_ref(), params, lattice, &mut notes)?;
         let straightened = lattice.filter(|_| params.straighten == Straighten::On);
         let exemplar = ctx.install(|| {
-            Ok(Exemplar::new(flat.as_ref().unwrap_or(photo), usable.as_ref(), straightened))
+            Ok(Exemplar::new(
+                ctx.simd,
+                flat.as_ref().unwrap_or(photo),
+                usable.as_ref(),
+                straightened,
+            ))
         })?;
         let plan = Plan {
             size: (size.1, size.0),
