@@ -1,5 +1,6 @@
 //! Where the autocorrelation is looked at: smoothed, and with its ridges taken away.
 
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use crate::signal::autocorrelation::Autocorrelation;
@@ -66,12 +67,14 @@ impl Field {
         }
         let (rows, cols) = (2 * reach[0] + 1, 2 * reach[1] + 1);
         let mut excess = vec![0.0f32; rows * cols];
+        let arch = Arch::new();
         // The upper half; the lower is its mirror image.
         excess[..(reach[0] + 1) * cols].par_chunks_mut(cols).enumerate().for_each(|(i, row)| {
             let y = i as isize - reach[0] as isize;
             let mut highest = vec![0.0f64; cols];
             for &direction in &directions {
-                let means = ridges(&smooth, (y, reach[1] as isize), direction, half, lobe);
+                let at = (y, reach[1] as isize);
+                let means = arch.dispatch(Ridges { plane: &smooth, at, direction, half, lobe });
                 highest.iter_mut().zip(means).for_each(|(h, mean)| *h = h.max(mean));
             }
             for ((x, value), highest) in (-(reach[1] as isize)..).zip(row).zip(highest) {
@@ -230,48 +233,67 @@ fn ridge_directions(plane: &Plane, shorter: f64, lobe: f64) -> Vec<[f64; 2]> {
 }
 
 /// The means along the lines in a direction through all displacements of a row, `y` and from -`reach`
-/// to `reach`; 0 where nothing is known. What lies within `lobe` of no displacement does not count.
-fn ridges(
-    plane: &Plane,
-    (y, reach): (isize, isize),
-    [dy, dx]: [f64; 2],
+/// to `reach` (`at` has both); 0 where nothing is known. What lies within `lobe` of no displacement does not count.
+struct Ridges<'a> {
+    plane: &'a Plane,
+    at: (isize, isize),
+    direction: [f64; 2],
     half: f64,
     lobe: f64,
-) -> Vec<f64> {
-    let cols = (2 * reach + 1) as usize;
-    let (mut sum, mut n) = (vec![0.0; cols], vec![0.0; cols]);
-    for i in -RIDGE_SAMPLES..=RIDGE_SAMPLES {
-        // A sample lies alike between displacements for the whole row.
-        let t = half * f64::from(i) / f64::from(RIDGE_SAMPLES);
-        let (at_y, by_x) = (y as f64 + t * dy, t * dx);
-        let (y0, x0) = (floor(at_y), floor(by_x));
-        let (fy, fx) = (at_y - y0 as f64, by_x - x0 as f64);
-        if y0 < -plane.reach[0] || y0 >= plane.reach[0] {
-            continue;
+}
+
+impl WithSimd for Ridges<'_> {
+    type Output = Vec<f64>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Vec<f64> {
+        let Self { plane, at: (y, reach), direction: [dy, dx], half, lobe } = self;
+        let cols = (2 * reach + 1) as usize;
+        let (mut sum, mut n) = (vec![0.0; cols], vec![0.0; cols]);
+        for i in -RIDGE_SAMPLES..=RIDGE_SAMPLES {
+            // A sample lies alike between displacements for the whole row.
+            let t = half * f64::from(i) / f64::from(RIDGE_SAMPLES);
+            let (at_y, by_x) = (y as f64 + t * dy, t * dx);
+            let (y0, x0) = (floor(at_y), floor(by_x));
+            let (fy, fx) = (at_y - y0 as f64, by_x - x0 as f64);
+            if y0 < -plane.reach[0] || y0 >= plane.reach[0] {
+                continue;
+            }
+            // The columns whose sample has known neighbours.
+            let first = (-reach).max(-plane.reach[1] - x0);
+            let last = reach.min(plane.reach[1] - 1 - x0);
+            if first > last {
+                continue;
+            }
+            let (from, count) = ((first + reach) as usize, (last - first + 1) as usize);
+            let line = |y: isize| &plane.row(y)[(first + x0 + plane.reach[1]) as usize..][..=count];
+            let (upper, lower) = (line(y0), line(y0 + 1));
+            let (sum, n) = (&mut sum[from..][..count], &mut n[from..][..count]);
+            let pairs = upper.windows(2).zip(lower.windows(2)).map(|(upper, lower)| {
+                let between = |ends: &[f32]| {
+                    let (a, b) = (f64::from(ends[0]), f64::from(ends[1]));
+                    a + (b - a) * fx
+                };
+                let (top, bottom) = (between(upper), between(lower));
+                top + (bottom - top) * fy
+            });
+            let all = sum.iter_mut().zip(n.iter_mut()).zip(pairs);
+            if at_y.abs() > lobe {
+                all.for_each(|((sum, n), value)| {
+                    *sum += value;
+                    *n += 1.0;
+                });
+                continue;
+            }
+            for (k, ((sum, n), value)) in all.enumerate() {
+                let x = (first + k as isize) as f64 + by_x;
+                let counts = f64::from(u8::from(at_y * at_y + x * x > lobe * lobe));
+                *sum += counts * value;
+                *n += counts;
+            }
         }
-        // The columns whose sample has known neighbours.
-        let first = (-reach).max(-plane.reach[1] - x0);
-        let last = reach.min(plane.reach[1] - 1 - x0);
-        if first > last {
-            continue;
-        }
-        let (from, count) = ((first + reach) as usize, (last - first + 1) as usize);
-        let line = |y: isize| &plane.row(y)[(first + x0 + plane.reach[1]) as usize..][..=count];
-        let (upper, lower) = (line(y0), line(y0 + 1));
-        let (sum, n) = (&mut sum[from..][..count], &mut n[from..][..count]);
-        for (k, (sum, n)) in sum.iter_mut().zip(n).enumerate() {
-            let x = (first + k as isize) as f64 + by_x;
-            let counts = f64::from(u8::from(at_y * at_y + x * x > lobe * lobe));
-            let between = |line: &[f32]| {
-                let (a, b) = (f64::from(line[k]), f64::from(line[k + 1]));
-                a + (b - a) * fx
-            };
-            let (top, bottom) = (between(upper), between(lower));
-            *sum += counts * (top + (bottom - top) * fy);
-            *n += counts;
-        }
+        sum.iter().zip(n).map(|(sum, n)| if n > 0.0 { sum / n } else { 0.0 }).collect()
     }
-    sum.iter().zip(n).map(|(sum, n)| if n > 0.0 { sum / n } else { 0.0 }).collect()
 }
 
 #[cfg(test)]
@@ -298,7 +320,8 @@ mod tests {
         let plane = Plane { reach, values };
         for direction in [[0.0, 1.0], [1.0, 0.0], [0.6, 0.8], [-0.28, 0.96]] {
             for y in [-30isize, -17, -3, 0, 12, 30] {
-                let row = ridges(&plane, (y, 35), direction, 19.3, 4.1);
+                let row = Ridges { plane: &plane, at: (y, 35), direction, half: 19.3, lobe: 4.1 };
+                let row = Arch::new().dispatch(row);
                 assert_eq!(row.len(), 71);
                 for (x, got) in (-35..).zip(row) {
                     let want = ridge(&plane, [y as f64, f64::from(x)], direction, 19.3, 4.1);

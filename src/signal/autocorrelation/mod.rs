@@ -3,6 +3,7 @@
 mod overlap;
 mod products;
 
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use overlap::{Overlap, Side};
@@ -66,6 +67,8 @@ impl Autocorrelation {
         // Of the overlaps of a row.
         let widths: Vec<f64> = (0..cols).map(|i| (width - i.abs_diff(width - 1)) as f64).collect();
         let mut lower = vec![0.0f32; height * cols];
+        // With the CPU's widest instructions; the same bits, as no product and sum are joined.
+        let arch = Arch::new();
         let bands = lower.par_chunks_mut(BAND * cols).zip(starts);
         bands.enumerate().for_each_init(
             || (products.rows(), vec![0.0; cols], Line::new(width)),
@@ -82,10 +85,18 @@ impl Autocorrelation {
                     let (left_counts, right_counts) = counts.split_at(width - 1);
                     let (left_products, right_products) = products.row(dy);
                     let sides = overlaps.iter().map(Overlap::to_the_right).zip(&flat);
-                    line.correlate(right, right_counts, right_products, sides);
+                    let (counts, products) = (right_counts, right_products);
+                    arch.dispatch(Correlated { line, out: right, counts, products, planes: sides });
                     if dy > 0 {
                         let sides = overlaps.iter().map(Overlap::to_the_left).zip(&flat);
-                        line.correlate(left, left_counts, left_products, sides);
+                        let (counts, products) = (left_counts, left_products);
+                        arch.dispatch(Correlated {
+                            line,
+                            out: left,
+                            counts,
+                            products,
+                            planes: sides,
+                        });
                     } else {
                         // Its own mirror image, up to rounding.
                         left.iter_mut().rev().zip(&right[1..]).for_each(|(to, from)| *to = *from);
@@ -172,18 +183,26 @@ impl Line {
     fn new(width: usize) -> Self {
         Self { covariance: vec![0.0; width], spread: vec![0.0; width] }
     }
+}
 
-    /// The correlations where overlaps have `counts` pixels and `products` as sums of products. Each
-    /// plane's `Side` comes with the variance, per pixel of both overlap and picture, that counts as flat.
-    fn correlate<'a>(
-        &mut self,
-        out: &mut [f32],
-        counts: &[f64],
-        products: &[f64],
-        planes: impl Iterator<Item = (Side<'a>, &'a f64)>,
-    ) {
-        let covariance = &mut self.covariance[..out.len()];
-        let spread = &mut self.spread[..out.len()];
+/// The correlations where overlaps have `counts` pixels and `products` as sums of products. Each plane's
+/// `Side` comes with the variance, per pixel of both overlap and picture, that counts as flat.
+struct Correlated<'a, I> {
+    line: &'a mut Line,
+    out: &'a mut [f32],
+    counts: &'a [f64],
+    products: &'a [f64],
+    planes: I,
+}
+
+impl<'a, I: Iterator<Item = (Side<'a>, &'a f64)>> WithSimd for Correlated<'_, I> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { line, out, counts, products, planes } = self;
+        let covariance = &mut line.covariance[..out.len()];
+        let spread = &mut line.spread[..out.len()];
         spread.fill(0.0);
         for ((covariance, product), n) in covariance.iter_mut().zip(products).zip(counts) {
             *covariance = n * product;
