@@ -46,7 +46,9 @@ impl Products {
         let blocks = bins.div_ceil(BLOCK);
         let bands = height.div_ceil(BAND);
         // Bands of rows; of each, blocks of columns: rows are written and columns read nearly in place.
-        let mut spectrum = vec![[0.0; 2]; bands * BAND * blocks * BLOCK];
+        // Blocks that are read back a power of two apart would displace each other from the cache.
+        let block_len = (height | 1) * BLOCK;
+        let mut spectrum = vec![[0.0; 2]; (bands * BAND * BLOCK).max(block_len) * blocks];
         // Columns a power of two apart would displace each other from the cache.
         let stride = half + BLOCK;
         // Columns one after the other: even frequencies, then odd.
@@ -96,7 +98,6 @@ impl Products {
         }
         // Columns back. The power is real, so both halves can be transformed as one.
         let scale = 0.5 / (rows * cols) as f64;
-        let block_len = height * BLOCK;
         let mut columns = spectrum;
         columns.truncate(blocks * block_len);
         columns.par_chunks_mut(block_len).zip(power.par_chunks(BLOCK * rows)).for_each_init(
