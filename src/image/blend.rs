@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::base::error::{Error, Result};
-use crate::image::color::SrgbTables;
+use crate::image::color::{SrgbTables, linear_from_srgb, srgb_from_linear};
 use crate::image::material::MapKind;
 use crate::image::normals::renormalize;
 use crate::image::picture::{Encoding, Picture, Sample, Samples};
@@ -28,10 +28,9 @@ pub fn mixed(
         return Err(Error::SizeMismatch { what, got_w, got_h, want_w: w, want_h: h, remedy });
     }
     let curved = a.encoding == Encoding::Srgb && kind == MapKind::Color;
-    let curve = curved.then(SrgbTables::get);
     let alpha = a.alpha_channel();
     let samples =
-        with_samples!(a.samples(), v => mixed_samples(v, b.samples(), (c, alpha, curve), &share));
+        with_samples!(a.samples(), v => mixed_samples(v, b.samples(), (c, alpha, curved), &share));
     let picture = a.with_samples(h, w, c, samples)?;
     if kind.is_normal() { renormalize(picture) } else { Ok(picture) }
 }
@@ -39,10 +38,14 @@ pub fn mixed(
 fn mixed_samples<T: Sample>(
     a: &[T],
     b: &Samples,
-    (c, alpha, curve): (usize, Option<usize>, Option<&SrgbTables>),
+    (c, alpha, curved): (usize, Option<usize>, bool),
     share: &(impl Fn(usize) -> f64 + Sync),
 ) -> Samples {
     let b = T::slice(b).unwrap_or(a);
+    // Rounding hides the tables' errors; floats would show them where both are alike.
+    let tables = (T::SCALE > 1.0).then(SrgbTables::get);
+    let linear = |v| tables.map_or_else(|| linear_from_srgb(v), |t| t.linear(v));
+    let display = |v| tables.map_or_else(|| srgb_from_linear(v), |t| t.display(v));
     let mut out = a.to_vec();
     out.par_chunks_exact_mut(c).enumerate().for_each(|(i, px)| {
         let share = share(i);
@@ -52,9 +55,10 @@ fn mixed_samples<T: Sample>(
         for (k, v) in px.iter_mut().enumerate() {
             let (near, far) = (v.to_unit(), b[i * c + k].to_unit());
             let mix = |near: f64, far: f64| (1.0 - share) * near + share * far;
-            *v = T::from_unit(match curve.filter(|_| Some(k) != alpha) {
-                Some(curve) => curve.display(mix(curve.linear(near), curve.linear(far))),
-                None => mix(near, far),
+            *v = T::from_unit(if curved && Some(k) != alpha {
+                display(mix(linear(near), linear(far)))
+            } else {
+                mix(near, far)
             });
         }
     });
