@@ -7,9 +7,10 @@ use crate::image::picture::Picture;
 use crate::image::sourcemap::SourceMap;
 use crate::search::patchmatch::Wrap;
 
-/// Mean squared distance per patch pixel (L*a*b* units squared) between the patches of `texture`
+/// Mean squared distance per patch pixel (L*a*b* units squared) between the patches of a texture
 /// and the patches of `photos` that `map` names for their centres: an upper bound of the texture
-/// cost, which takes the best patch of the whole photo.
+/// cost, which takes the best patch of the whole photo. `colors` are the texture's, to match (see
+/// [`ColorModel::matching_pixels`]), one a pixel of `map`.
 ///
 /// The mean is over an even grid of at most 16384 patches. Patches at the photo's border are moved
 /// inside; on an axis that does not wrap, only whole patches of the texture count.
@@ -20,14 +21,15 @@ use crate::search::patchmatch::Wrap;
 /// # Determinism
 /// Same bytes for any thread count.
 pub fn cost_bound(
-    texture: &Picture,
+    colors: &[[f32; 3]],
     photos: &[&Picture],
     map: &SourceMap,
     patch: usize,
     wrap: Wrap,
 ) -> f64 {
     let model = ColorModel::new(photos[0]);
-    let (h, w) = (texture.height(), texture.width());
+    let (h, w) = (map.height(), map.width());
+    assert_eq!(colors.len(), h * w, "colors do not fill the texture");
     let half = (patch / 2) as isize;
     let step = ((h * w) as f64 / 16384.0).sqrt().ceil().max(1.0) as usize;
     let inside = |i: usize, n: usize, wrap: bool| {
@@ -60,7 +62,7 @@ pub fn cost_bound(
                         if same_photo && map.positions()[ty * w + tx] == [py as u32, px as u32] {
                             continue;
                         }
-                        let f = model.matching_pixel(texture, ty * w + tx);
+                        let f = colors[ty * w + tx];
                         let e = model.matching_pixel(photo, py * size.1 + px);
                         sum += (0..3).map(|k| ((f[k] - e[k]) as f64).powi(2)).sum::<f64>();
                     }

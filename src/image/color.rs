@@ -174,20 +174,23 @@ impl ColorModel {
     /// Three channels a pixel in the space where averages are right: linear light for colours, the
     /// numbers themselves for data (their principal components if there are more than three).
     pub fn averaging_pixels(&self, picture: &Picture) -> Vec<[f32; 3]> {
-        match picture.samples() {
-            Samples::U8(v) => pixels(picture, v, |px| self.by_table(px)),
-            Samples::U16(v) => pixels(picture, v, |px| self.by_table(px)),
-            samples => with_samples!(samples, v => {
-                pixels(picture, v, |px| self.averaging(px.len(), |k| px[k].to_unit()))
-            }),
-        }
+        self.pixels(picture, |_| {})
     }
 
     /// The colours to match.
     pub fn matching_pixels(&self, picture: &Picture) -> Vec<[f32; 3]> {
-        let mut pixels = self.averaging_pixels(picture);
-        pixels.par_chunks_mut(picture.width()).for_each(|row| self.space.convert_row(row));
-        pixels
+        self.pixels(picture, |row| self.space.convert_row(row))
+    }
+
+    /// The averaging pixels, with `then` done to every row of them.
+    fn pixels(&self, picture: &Picture, then: impl Fn(&mut [[f32; 3]]) + Sync) -> Vec<[f32; 3]> {
+        match picture.samples() {
+            Samples::U8(v) => pixels(picture, v, |px| self.by_table(px), then),
+            Samples::U16(v) => pixels(picture, v, |px| self.by_table(px), then),
+            samples => with_samples!(samples, v => {
+                pixels(picture, v, |px| self.averaging(px.len(), |k| px[k].to_unit()), then)
+            }),
+        }
     }
 
     /// The colour to match of pixel `i`.
@@ -234,17 +237,19 @@ impl ColorModel {
     }
 }
 
-/// What `of` makes of every pixel's samples, row by row.
+/// What `of` makes of every pixel's samples, and `then` of their rows.
 fn pixels<T: Sample>(
     picture: &Picture,
     samples: &[T],
     of: impl Fn(&[T]) -> [f32; 3] + Sync,
+    then: impl Fn(&mut [[f32; 3]]) + Sync,
 ) -> Vec<[f32; 3]> {
     let (width, c) = (picture.width(), picture.channels());
     let mut out = vec![[0.0; 3]; picture.height() * width];
     let rows = out.par_chunks_exact_mut(width).zip(samples.par_chunks_exact(width * c));
     rows.for_each(|(out, row)| {
         out.iter_mut().zip(row.chunks_exact(c)).for_each(|(out, px)| *out = of(px));
+        then(out);
     });
     out
 }

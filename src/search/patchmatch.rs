@@ -15,7 +15,7 @@ use crate::search::phase::Phase;
 use crate::search::place_cost::PlaceCost;
 use crate::search::source::Source;
 
-/// Rows of a band. Fewer rows: more parallel work, slower propagation between bands.
+/// Most rows of a band. Fewer rows: more parallel work, slower propagation between bands.
 const BAND: usize = 32;
 
 /// Stage of the random candidates.
@@ -70,16 +70,22 @@ pub fn pass(
     let mut next: Vec<Pos> = field.pos.par_iter().copied().collect();
     let band = Band { target, source, place_cost, wrap, search, field, seed: ctx.seed };
     // Every other pair of passes the bands are shifted by half: no row is always at an edge.
-    let head = if search.pass % 4 < 2 { 0 } else { (BAND / 2).min(field.height) };
+    let height = band_height(field.height);
+    let head = if search.pass % 4 < 2 { 0 } else { height / 2 };
     let (first, rest) = next.split_at_mut(head * field.width);
     let bands = std::iter::once((0, first)).filter(|(_, rows)| !rows.is_empty());
-    let rest = rest.chunks_mut(BAND * field.width).enumerate();
-    let bands: Vec<_> = bands.chain(rest.map(|(i, rows)| (head + i * BAND, rows))).collect();
+    let rest = rest.chunks_mut(height * field.width).enumerate();
+    let bands: Vec<_> = bands.chain(rest.map(|(i, rows)| (head + i * height, rows))).collect();
     bands.into_par_iter().with_max_len(1).try_for_each(|(y0, rows)| {
         with_kernel(ctx.simd, source.patch, BandJob { band: &band, ctx, y0, rows })
     })?;
     field.pos = next;
     Ok(())
+}
+
+/// Rows of a band of a field of this many rows: as many as let an even number of bands be of one height.
+fn band_height(rows: usize) -> usize {
+    rows.div_ceil(2 * rows.div_ceil(2 * BAND))
 }
 
 struct BandJob<'a, 'b> {

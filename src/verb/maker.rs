@@ -466,7 +466,7 @@ fn costs(
         other => other.cost(&pixels, domain, &evenness.window((height, width), domain)),
     };
     Costs {
-        texture: map.map(|map| texture::cost_bound(picture, photos, map, params.patch, wrap)),
+        texture: map.map(|map| texture::cost_bound(&pixels, photos, map, params.patch, wrap)),
         stationarity,
         stationarity_by_measure: params.evenness(sigma_map).map(by_measure),
     }

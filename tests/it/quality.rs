@@ -374,12 +374,7 @@ mod costs {
 
     /// Paper eq. 5 by its definition: for every patch of the torus the nearest of all the photo's.
     fn exact(photo: &Picture, tile: &Picture) -> f64 {
-        let lab = |picture: &Picture| {
-            let model = ColorModel::new(photo);
-            let mut lab = model.averaging_pixels(picture);
-            model.space().convert_row(&mut lab);
-            lab
-        };
+        let lab = |picture: &Picture| ColorModel::new(photo).matching_pixels(picture);
         let (e, f) = (lab(photo), lab(tile));
         let (h, w) = (tile.height(), tile.width());
         let distance = |ty: usize, tx: usize, sy: usize, sx: usize| {
@@ -422,7 +417,8 @@ mod costs {
             let map = SourceMap::new((24, 26), (40, 44), (0..24 * 26).map(place).collect());
             let map = map.expect("map");
             let tile = map.apply(&photo, MapKind::Color).expect("gather");
-            cost_bound(&tile, &[&photo], &map, PATCH, wrap)
+            let colors = ColorModel::new(&photo).matching_pixels(&tile);
+            cost_bound(&colors, &[&photo], &map, PATCH, wrap)
         };
         assert_eq!(cost(&|i| [i / 26 + 7, i % 26 + 3]), 0.0, "a crop");
         let shuffled = cost(&|i| [i * 17 % 40, i * 29 % 44]);

@@ -162,11 +162,19 @@ pub(super) fn write<W: Write + Seek>(
     let mut writer = begin().map_err(failed)?;
     let size = frame.height * frame.row_len() * if narrow { 1 } else { 2 };
     if size <= AT_ONCE {
-        let mut all = Vec::with_capacity(size);
+        let mut gathered = Vec::new();
         while let Some(samples) = pieces.next()? {
-            all.extend_from_slice(&bytes(samples, pixel).map_err(|e| frame.refused(e))?);
+            let piece = bytes(samples, pixel).map_err(|e| frame.refused(e))?;
+            // A picture that comes whole is not copied.
+            if piece.len() == size {
+                writer.write_image_data(&piece).map_err(failed)?;
+                continue;
+            }
+            gathered.extend_from_slice(&piece);
+            if gathered.len() == size {
+                writer.write_image_data(&gathered).map_err(failed)?;
+            }
         }
-        writer.write_image_data(&all).map_err(failed)?;
     } else {
         let mut stream = writer.stream_writer_with_size(CHUNK).map_err(failed)?;
         while let Some(samples) = pieces.next()? {
