@@ -136,9 +136,10 @@ def tile(
     lattice : {"off", "auto"}
         Whether a photo that repeats (bricks, tiles, weave) stays in step, as far as
         `detect_lattice` finds its periods. The default size then is a whole number of them, and a
-        `size` that is one within 8 % is kept in step too. Another cuts some, but straight rows
-        (the courses of bricks) stay so if a whole number of them fits within 3 %; a note in
-        ``tile.report["notes"]`` says what was kept and which size would do. For the method
+        given `size` holds the nearest number of them, a little narrower or wider, if that is one
+        within 45 %. Another cuts some, but straight rows (the courses of bricks) stay so if a
+        whole number of them fits within 3 %; a note in ``tile.report["notes"]`` says what was
+        kept and which size would do without. For the method
         ``"stationary"``, of one photo as it lies, without a band.
     band : int
         Width of the border that is made anew, in pixels, so that the photo repeats; its middle

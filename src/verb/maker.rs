@@ -352,16 +352,26 @@ fn follow(
         nearest
     };
     if let Some(snap) = held {
-        let off = (snap.scale_x - 1.0).abs().max((snap.scale_y - 1.0).abs());
+        // An axis that does not repeat holds what there is room for, as large as in the photo.
+        let wrap = wrap(params);
+        let scales = [(wrap.x, snap.scale_x), (wrap.y, snap.scale_y)];
+        let off = scales.iter().map(|&(wrap, scale)| if wrap { (scale - 1.0).abs() } else { 0.0 });
+        let off = off.fold(0.0, f64::max);
         let by = if off > MOST_SCALING {
-            format!(", scaled by up to {:.0} %", 100.0 * off)
+            let whole =
+                nearest.map_or(String::new(), |s| format!("; {}x{} needs none", s.width, s.height));
+            format!(", scaled by up to {:.0} %{whole}", 100.0 * off)
         } else {
             String::new()
         };
         let (w, h) = (snap.width, snap.height);
         notes.push(format!("{vectors}; a tile of {w}x{h} holds whole periods{by}"));
         let vectors = [lattice.v1, lattice.v2];
-        let periods = Periods::Lattice { vectors, of_output: snap.periods };
+        let of_output = std::array::from_fn(|k| {
+            let (wrap, scale) = scales[k];
+            snap.periods[k].map(|n| n as f64 * if wrap { 1.0 } else { scale })
+        });
+        let periods = Periods::Lattice { vectors, of_output };
         return Ok(Some(((snap.width, snap.height), periods)));
     }
     let whole = nearest.map_or(String::new(), |s| format!("; {}x{} does", s.width, s.height));

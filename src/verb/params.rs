@@ -166,7 +166,7 @@ params! {
         flatten: f32 = 0.0, in 0.0..=1.0, unit "fraction of the photo's shorter side";
         /// Whether patches are also used mirrored left to right, turned by quarters, or both: more to choose from, but light then falls from several sides.
         symmetry: Symmetries = Symmetries::None;
-        /// Whether a photo that repeats (bricks, tiles, weave) stays in step: the size auto becomes a whole number of periods; a size given is kept in step if it is one within 8 %, and where only the courses fit (3 %), they are. For the method stationary, of one photo as it lies, without a band.
+        /// Whether a photo that repeats (bricks, tiles, weave) stays in step: the size auto becomes a whole number of periods; a size given holds the nearest number of them, a little narrower or wider, if that is one within 45 %; where only the courses fit (3 %), they are kept. For the method stationary, of one photo as it lies, without a band.
         lattice: Follow = Follow::Auto;
         /// Keep the photo's middle as it is, pixel for pixel, and make only a border of this width anew, so that it repeats; 0 makes all anew.
         band: usize = 0, in 0..=8192, unit "px";

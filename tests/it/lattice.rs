@@ -347,16 +347,54 @@ mod following {
     #[test]
     fn a_size_that_cuts_bricks_is_made_and_said() {
         let photo = wall();
-        // Two bricks and a quarter, and four courses and a half.
-        let size = Size::Pixels { width: 83, height: 94 };
+        // Half a brick, and four courses and a half.
+        let size = Size::Pixels { width: 20, height: 94 };
         let params = TileParams { size, ..Default::default() };
         let tile = made(&photo, &params, 2);
-        assert_eq!(tile.report.tile_size, (83, 94));
+        assert_eq!(tile.report.tile_size, (20, 94));
         let said = tile.report.notes.iter().find(|note| note.contains("some are cut"));
         assert!(said.is_some_and(|note| note.contains("x84 does")), "{:?}", tile.report.notes);
         let off = made(&photo, &TileParams { lattice: Follow::Off, ..params }, 2);
         assert!(off.picture.samples() == tile.picture.samples());
         assert!(off.report.notes.is_empty());
+    }
+
+    #[test]
+    fn a_size_between_whole_numbers_of_bricks_holds_narrower_or_wider_ones() {
+        let photo = wall();
+        // Bricks and pairs of courses: 2 and a quarter of both; 3 and a half, 1 and two thirds.
+        for (width, height) in [(83, 94), (130, 70)] {
+            let size = Size::Pixels { width, height };
+            let params = TileParams { size, ..Default::default() };
+            let tile = made(&photo, &params, 2);
+            assert_eq!(tile.report.tile_size, (width, height));
+            let said = |n: &String| n.contains("whole periods, scaled by up to");
+            assert!(tile.report.notes.iter().any(said), "{:?}", tile.report.notes);
+            let free = made(&photo, &TileParams { lattice: Follow::Off, ..params }, 2);
+            let (held, free) = (in_step(&tile), in_step(&free));
+            assert!(held > 0.9, "{width}x{height}: {held} in step");
+            assert!(free < 0.5, "{width}x{height}: {free} in step without");
+        }
+    }
+
+    #[test]
+    fn an_axis_that_does_not_repeat_scales_nothing() {
+        let photo = wall();
+        let size = Size::Pixels { width: 148, height: 94 };
+        let params = TileParams { size, axis: texforge::Axis::X, ..Default::default() };
+        let tile = made(&photo, &params, 2);
+        let said = |n: &String| n.contains("whole periods") && !n.contains("scaled");
+        assert!(tile.report.notes.iter().any(said), "{:?}", tile.report.notes);
+        // Four bricks; courses as high as in the photo: a pixel below another comes from below it.
+        let map = tile.source_map.expect("a source map");
+        let near = |(i, &[y, x]): (usize, &[u32; 2])| {
+            let (dy, dx) = (f64::from(y) - (i / 148) as f64, f64::from(x) - (i % 148) as f64);
+            let course = (dy / 21.0).round();
+            let along = dx - 18.5 * course;
+            (dy - 21.0 * course).hypot(along - 37.0 * (along / 37.0).round()) <= 2.0
+        };
+        let in_step = map.positions().iter().enumerate().filter(|&p| near(p)).count();
+        assert!(in_step as f64 > 0.9 * (148 * 94) as f64, "{in_step} in step");
     }
 
     #[test]
@@ -374,8 +412,8 @@ mod following {
             positions.iter().enumerate().filter(|&p| near(p)).count() as f64
                 / positions.len() as f64
         };
-        // Two bricks and a half; four courses a little stretched, or five, which turns the bond over.
-        for (width, height) in [(92, 86), (92, 105)] {
+        // Half a brick; four courses a little stretched, or five, which turns the bond over.
+        for (width, height) in [(19, 86), (19, 105)] {
             let size = Size::Pixels { width, height };
             let params = TileParams { size, ..Default::default() };
             let tile = made(&photo, &params, 2);
@@ -392,7 +430,7 @@ mod following {
             }
         }
         // Where nothing repeats downwards, any height will do.
-        let size = Size::Pixels { width: 92, height: 94 };
+        let size = Size::Pixels { width: 19, height: 94 };
         let params = TileParams { size, axis: texforge::Axis::X, ..Default::default() };
         let tile = made(&photo, &params, 2);
         let said = |n: &String| n.contains("whole rows");

@@ -91,8 +91,9 @@ pub enum Periods {
     Lattice {
         /// Vectors in pixels of the photo, each to the right and downwards.
         vectors: Basis,
-        /// Coefficients of the displacements by the output's width and by its height.
-        of_output: [[i64; 2]; 2],
+        /// Coefficients of the displacements by the output's width and by its height; whole numbers
+        /// where it repeats.
+        of_output: [[f64; 2]; 2],
     },
     /// One or two families of its rows alone: along one nothing is held.
     Rows(Vec<Rows>),
@@ -112,10 +113,10 @@ impl Periods {
         match self {
             Self::Lattice { vectors, of_output } => {
                 let vectors = vectors.map(|[x, y]| [x * sx, y * sy]);
-                // Cells of the output: its sides are whole combinations of them.
-                let [[a, b], [c, d]] = of_output.map(|row| row.map(|n| n as f64));
+                // Cells of the output, of which its sides are made.
+                let [[a, b], [c, d]] = *of_output;
                 let n = a * d - b * c;
-                if n == 0.0 {
+                if n.abs() < 1e-9 {
                     return None;
                 }
                 let output = [[d * w / n, -b * h / n], [-c * w / n, a * h / n]];

@@ -373,7 +373,7 @@ fn cut(
         // The band comes from the same place of other periods.
         periods: Some(Periods::Lattice {
             vectors: [[tw as f64, 0.0], [0.0, th as f64]],
-            of_output: [[1, 0], [0, 1]],
+            of_output: [[1.0, 0.0], [0.0, 1.0]],
         }),
         kept: None,
         coarse_iterations: 30,
