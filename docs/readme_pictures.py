@@ -13,6 +13,7 @@ import numpy as np
 import skimage.data
 import texforge
 from PIL import Image
+from skimage.transform import ProjectiveTransform, warp
 
 OUT = Path(__file__).parent / "pictures"
 SCALE = 0.4
@@ -28,6 +29,18 @@ def stained(photo: texforge.Image) -> texforge.Image:
         distance = np.hypot(y - cy, x - cx) + wobble
         light *= 1 - depth / (1 + np.exp((distance - radius) / 0.025))
     return texforge.Image.tagged(np.rint(np.asarray(photo) * light).astype(np.uint8), "srgb")
+
+
+def straightened(photo: texforge.Image) -> texforge.Image:
+    """Return the photograph of bricks as if seen from straight above, courses level."""
+    width, height = 480, 400
+    corners = np.array([[0, 0], [height, 0], [height, width], [0, width]])
+    # Between two courses, by eye: they run apart downwards.
+    seen = np.array([[73, 0], [428, 0], [527, 511], [14, 511]])
+    view = ProjectiveTransform.from_estimate(corners, seen)
+    flat = warp(np.asarray(photo), view, output_shape=(width, height), preserve_range=True)
+    inside = np.rot90(flat[20:470, :385])
+    return texforge.Image.tagged(np.rint(inside).clip(0, 255).astype(np.uint8), "srgb")
 
 
 def small(image: object, scale: float = SCALE) -> Image.Image:
@@ -63,8 +76,20 @@ def main() -> None:
     for row, name in zip(rows[1:], list(photos)[1:], strict=True):
         save(f"{name}.jpg", [row])
 
+    bricks = straightened(photos["brick"])
+    wall = texforge.regular(bricks, size=(512, 640))
+    print(f"bricks: {texforge.detect_lattice(bricks)}")
+    tile = texforge.tile(bricks, size=(256, 384))
+    print(f"bricks, tile: {tile.report['notes']}")
+    cells: list[contact.Cell] = [
+        (f"photo, straightened, {bricks.shape[1]} x {bricks.shape[0]}", small(bricks, 0.6)),
+        ("regular, 640 x 512", small(wall.image, 0.6)),
+        ("tile, 384 x 256, repeated 2 x 2", small(tile.tiled(2, 2), 0.6)),
+    ]
+    save("bricks.jpg", [cells])
+
     photo = stained(photos["gravel"])
-    cells: list[contact.Cell] = [("photo with a stain, 512 x 512", small(photo, 0.333))]
+    cells = [("photo with a stain, 512 x 512", small(photo, 0.333))]
     for method, label in (("wrap-only", "wrap-only: no seam"), ("stationary", "stationary")):
         tile = texforge.tile(photo, size=SIDE, method=method)  # type: ignore[arg-type]
         print(f"stained gravel, {method}: {tile.costs}")
