@@ -13,7 +13,6 @@ import numpy as np
 import skimage.data
 import texforge
 from PIL import Image
-from skimage.transform import ProjectiveTransform, warp
 
 OUT = Path(__file__).parent / "pictures"
 SCALE = 0.4
@@ -33,14 +32,23 @@ def stained(photo: texforge.Image) -> texforge.Image:
 
 def straightened(photo: texforge.Image) -> texforge.Image:
     """Return the photograph of bricks as if seen from straight above, courses level."""
-    width, height = 480, 400
-    corners = np.array([[0, 0], [height, 0], [height, width], [0, width]])
+    width, height = 400, 480
+    corners = [(0, 0), (width, 0), (width, height), (0, height)]
     # Between two courses, by eye: they run apart downwards.
-    seen = np.array([[73, 0], [428, 0], [527, 511], [14, 511]])
-    view = ProjectiveTransform.from_estimate(corners, seen)
-    flat = warp(np.asarray(photo), view, output_shape=(width, height), preserve_range=True)
+    seen = [(73, 0), (428, 0), (527, 511), (14, 511)]
+    rows, places = [], []
+    for (x, y), (u, v) in zip(corners, seen, strict=True):
+        rows += [[x, y, 1, 0, 0, 0, -u * x, -u * y], [0, 0, 0, x, y, 1, -v * x, -v * y]]
+        places += [u, v]
+    view = np.linalg.solve(np.array(rows, float), np.array(places, float)).tolist()
+    picture = Image.fromarray(np.asarray(photo))
+    flat = np.asarray(
+        picture.transform(
+            (width, height), Image.Transform.PERSPECTIVE, view, Image.Resampling.BICUBIC
+        )
+    )
     inside = np.rot90(flat[20:470, :385])
-    return texforge.Image.tagged(np.rint(inside).clip(0, 255).astype(np.uint8), "srgb")
+    return texforge.Image.tagged(np.ascontiguousarray(inside), "srgb")
 
 
 def small(image: object, scale: float = SCALE) -> Image.Image:
