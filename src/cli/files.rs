@@ -62,6 +62,29 @@ fn wrap<T: Sample>(v: Vec<T>) -> Samples {
     T::wrap(v)
 }
 
+/// Fails if one of these outputs, each with the flag that asks for it, cannot be written, or two are
+/// the same file.
+///
+/// # Errors
+/// Those of [`check_place`], [`Error::Parameter`].
+pub(super) fn check_places(
+    outputs: impl Iterator<Item = (&'static str, PathBuf)>,
+    inputs: &[&Path],
+    force: bool,
+) -> Result<()> {
+    let mut seen: Vec<PathBuf> = Vec::new();
+    for (flag, path) in outputs {
+        check_place(&path, inputs, force)?;
+        let absolute = std::path::absolute(&path).map_err(Error::io("write", &path))?;
+        if seen.contains(&absolute) {
+            let got = format!("{} twice", path.display());
+            return Err(Error::parameter(flag, "a file of its own for each output", got));
+        }
+        seen.push(absolute);
+    }
+    Ok(())
+}
+
 /// The map that goes by this name or alias, in any spelling (`normal`, `Normal-GL`).
 pub(super) fn map_of_name(name: &str) -> Option<MapName> {
     let plain: String = name.chars().filter(|c| !is_separator(*c)).collect();
