@@ -8,15 +8,16 @@ use serde_json::json;
 
 use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
+use crate::base::record::{Typed, record_of, typed_params};
 use crate::cli::maps::{self, Asked, Map};
 use crate::cli::show::duration;
 use crate::cli::small::{SCHEMA_VERSION, print_json};
 use crate::cli::sources::Sources;
-use crate::cli::summary::{Seconds, Typed, Written, record_of, typed_params};
+use crate::cli::summary::{Seconds, Written};
 use crate::cli::work::{Session, supervise};
 use crate::cli::{args, files};
 use crate::image::mask::Mask;
-use crate::image::material::MapKind;
+use crate::image::material::{MapKind, output_path};
 use crate::image::picture::Picture;
 use crate::verb::extract::{ExtractParams, Extraction, extract};
 use crate::verb::inputs::Inputs;
@@ -147,7 +148,7 @@ impl Request {
 
     /// Where the pieces of a map go, one of each tile of `photo`.
     fn places_of(&self, photo: &Picture, map: &str, picture: &Picture) -> Vec<PathBuf> {
-        let place = |i| maps::output_path(&self.folder.join(name("tile", i, photo)), map, picture);
+        let place = |i| output_path(&self.folder.join(name("tile", i, photo)), map, picture);
         (0..self.params.count).map(place).collect()
     }
 
@@ -247,7 +248,7 @@ fn write(
         let file = name("tile", i, picture);
         add("tile", None, &file, picture, MapKind::Color, Some(&record(made, i)))?;
         for (wanted, tiles) in &of_maps {
-            let path = maps::output_path(Path::new(&file), wanted.name, &tiles[i]);
+            let path = output_path(Path::new(&file), wanted.name, &tiles[i]);
             let path = path.to_string_lossy();
             add("map", Some(wanted.name), &path, &tiles[i], wanted.kind, None)?;
         }
@@ -266,9 +267,9 @@ fn write(
         std::fs::create_dir(&request.folder).map_err(Error::io("write", &request.folder))?;
     }
     for (written, bytes) in &all {
-        session.staging.stage(session, Path::new(&written.path), bytes)?;
+        session.staging.stage(Path::new(&written.path), bytes)?;
     }
-    session.staging.commit(session, request.force)?;
+    session.staging.commit(request.force)?;
     Ok(all.into_iter().map(|(written, _)| written).collect())
 }
 

@@ -41,7 +41,7 @@ pub(super) fn typed<'a>(
         let Some((name, path)) = split(spec) else {
             return Err(Error::parameter("map", "NAME=FILE, e.g. normal=brick_nrm.png", shown()));
         };
-        let Some(MapName { name, kind, .. }) = files::map_of_name(&name) else {
+        let Some(MapName { name, kind, .. }) = MapName::named(&name) else {
             let expected = format!("NAME=FILE where NAME is one of {}", known_names());
             return Err(Error::parameter("map", expected, shown()));
         };
@@ -252,24 +252,9 @@ fn split_os(spec: &OsStr) -> Option<(String, OsString)> {
     Some((name.to_owned(), path.into()))
 }
 
-/// Where a map of `tile` goes: `brick.png` and `normal` make `brick_normal.png`, and so does
-/// `brick_basecolor.png`. Integers become PNG, floats EXR, as both keep every bit.
-pub(super) fn output_path(tile: &Path, name: &str, map: &Picture) -> PathBuf {
-    let extension = if map.samples().is_float() { "exr" } else { "png" };
-    let stem = tile.file_stem().unwrap_or_default();
-    let stem = stem.to_str().map_or(stem, |s| OsStr::new(files::without_color_ending(s)));
-    let mut file = stem.to_owned();
-    if !file.is_empty() {
-        file.push("_");
-    }
-    file.push(format!("{name}.{extension}"));
-    tile.with_file_name(file)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::image::picture::{Encoding, Samples};
 
     fn specs(specs: &[&str]) -> Result<Vec<Wanted>> {
         let specs: Vec<OsString> = specs.iter().map(Into::into).collect();
@@ -301,16 +286,5 @@ mod tests {
         assert_eq!(maps[1].paths, [Path::new("h.png"), Path::new("i.png")]);
         let error = typed(all[..3].iter(), 2).expect_err("one height").to_string();
         assert!(error.contains("so height twice, got once"), "{error}");
-    }
-
-    #[test]
-    fn outputs_are_named_after_the_tile() {
-        let of = |samples| Picture::new(1, 1, 1, samples, Encoding::Data).expect("picture");
-        let (int, float) = (of(Samples::U16(vec![7])), of(Samples::F32(vec![0.5])));
-        let name = |tile: &str, map| output_path(Path::new(tile), "normal", map);
-        assert_eq!(name("x/brick.png", &int), Path::new("x/brick_normal.png"));
-        assert_eq!(name("x/brick.tif", &float), Path::new("x/brick_normal.exr"));
-        assert_eq!(name("brick_basecolor.png", &int), Path::new("brick_normal.png"));
-        assert_eq!(name("basecolor.png", &int), Path::new("normal.png"));
     }
 }

@@ -9,18 +9,18 @@ use serde::Serialize;
 
 use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
+use crate::base::record::{record_of, typed_params};
 use crate::cli::maps::{self, Asked, Map};
 use crate::cli::output::{Target, to_stdout};
 use crate::cli::show::duration;
 use crate::cli::small::{SCHEMA_VERSION, print_json};
 use crate::cli::sources::Sources;
-use crate::cli::strips::{self, STRIP_PIXELS};
-use crate::cli::summary::{Seconds, Written, record_of, typed_params};
+use crate::cli::summary::{Seconds, Written};
 use crate::cli::work::{Session, supervise};
 use crate::cli::{args, files};
-use crate::image::io::{Format, WriteOptions};
+use crate::image::io::{Format, STRIP_PIXELS, WriteOptions, write_strips};
 use crate::image::mask::Mask;
-use crate::image::material::MapKind;
+use crate::image::material::{MapKind, output_path};
 use crate::image::picture::Picture;
 use crate::signal::basis::Basis;
 use crate::verb::inputs::Inputs;
@@ -150,11 +150,11 @@ impl Request {
         let source_map = self.source_map.clone().map(|path| ("save-source-map", path));
         let maps = maps.iter().map(|m| ("map", self.place_of(m.wanted.name, &m.pictures[0])));
         let all = texture.into_iter().chain(source_map).chain(maps);
-        files::check_places(all, &inputs, self.force)
+        files::check_outputs(all, &inputs, self.force)
     }
 
     fn place_of(&self, name: &str, map: &Picture) -> PathBuf {
-        maps::output_path(self.output.file().unwrap_or(Path::new("texture.png")), name, map)
+        output_path(self.output.file().unwrap_or(Path::new("texture.png")), name, map)
     }
 }
 
@@ -207,28 +207,33 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Str
         |output: &Output<'_>| Format::from_extension(&output.path).is_some_and(Format::streams);
     let to_files = request.output != Target::Stdout;
     let mut piped = None;
+    let of_maps: Vec<_> =
+        outputs.iter().filter(|o| o.role == "map").map(|o| (o.of, o.kind)).collect();
     if to_files && request.source_map.is_none() && outputs.iter().all(streams) {
-        write_strips(session, ctx, &maker, &outputs)?;
+        let options =
+            |o: &Output<'_>| WriteOptions { kind: o.kind, record: o.record.clone(), force: true };
+        let files: Vec<_> = outputs.iter().map(|o| (o.path.as_path(), options(o))).collect();
+        let pictures = maker.pictures(ctx, STRIP_PIXELS, &of_maps)?;
+        write_strips(&session.staging, &files, height, pictures)?;
     } else {
-        let of_maps = outputs.iter().filter(|o| o.role == "map").map(|o| (o.of, o.kind));
-        let (texture, of_maps) = maker.make(ctx, &of_maps.collect::<Vec<_>>())?;
+        let (texture, of_maps) = maker.make(ctx, &of_maps)?;
         let pictures = to_files.then_some(&texture.picture).into_iter().chain(&of_maps);
         for (output, picture) in outputs.iter().zip(pictures) {
             session.check()?;
             let record = output.record.as_deref();
             let bytes = files::encode(picture, Some(&output.path), output.kind, record)?;
-            session.staging.stage(session, &output.path, &bytes)?;
+            session.staging.stage(&output.path, &bytes)?;
         }
         if let Some(path) = &request.source_map {
             let bytes = files::encode_source_map(&texture.source_map, path)?;
-            session.staging.stage(session, path, &bytes)?;
+            session.staging.stage(path, &bytes)?;
             files.push(Written::new("source_map", None, path, width, height));
         }
         if !to_files {
             piped = Some(files::encode(&texture.picture, None, MapKind::Color, Some(&record))?);
         }
     }
-    session.staging.commit(session, request.force)?;
+    session.staging.commit(request.force)?;
     if let Some(bytes) = piped {
         to_stdout(&bytes)?;
     }
@@ -240,28 +245,6 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Str
     let elapsed = session.console.elapsed();
     let line = line(request, &report, elapsed);
     Ok((summary(ctx, request, report, files, notes, elapsed.as_secs_f64()), line))
-}
-
-/// Writes all outputs while the texture is made from top to bottom.
-fn write_strips(
-    session: &Session,
-    ctx: &Ctx,
-    maker: &RegularMaker<'_>,
-    outputs: &[Output<'_>],
-) -> Result<()> {
-    let files: Vec<_> = outputs
-        .iter()
-        .map(|Output { path, kind, record, .. }| {
-            let options = WriteOptions { kind: *kind, record: record.clone(), force: true };
-            (path.as_path(), options)
-        })
-        .collect();
-    let pictures = maker.strips(ctx, STRIP_PIXELS)?.map(|strip| {
-        let strip = strip?;
-        let piece = |output: &Output<'_>| strip.picture(output.of, output.kind);
-        ctx.install(|| outputs.iter().map(piece).collect())
-    });
-    strips::write(session, &files, maker.size().1, pictures)
 }
 
 fn line(request: &Request, report: &RegularReport, elapsed: std::time::Duration) -> String {

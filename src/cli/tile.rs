@@ -6,14 +6,14 @@ use clap::ArgMatches;
 
 use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
-use crate::cli::maps::{self, Asked, Map};
+use crate::cli::maps::{Asked, Map};
 use crate::cli::output::{Target, to_stdout};
 use crate::cli::small::print_json;
 use crate::cli::sources::Sources;
 use crate::cli::summary::{self, Summary, Written};
 use crate::cli::work::{Session, supervise};
 use crate::cli::{args, files};
-use crate::image::material::MapKind;
+use crate::image::material::{MapKind, output_path};
 use crate::image::picture::Picture;
 use crate::image::rect::Rect;
 use crate::image::sheet;
@@ -49,7 +49,7 @@ struct Place {
 impl Place {
     /// The file of a map of the tile.
     fn map(&self, name: &str, map: &Picture) -> PathBuf {
-        maps::output_path(self.tile.file().unwrap_or(Path::new("tile.png")), name, map)
+        output_path(self.tile.file().unwrap_or(Path::new("tile.png")), name, map)
     }
 }
 
@@ -127,7 +127,7 @@ impl Request {
             let maps = maps.iter().map(|m| ("map", place.map(m.wanted.name, &m.pictures[0])));
             tile.into_iter().chain(source_map).chain(preview).chain(maps)
         });
-        files::check_places(outputs, &inputs, self.force)
+        files::check_outputs(outputs, &inputs, self.force)
     }
 }
 
@@ -184,7 +184,7 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Vec
         let mut stage =
             |role, name: Option<&str>, path: &Path, bytes: Vec<u8>, picture: &Picture| {
                 session.check()?;
-                session.staging.stage(session, path, &bytes)?;
+                session.staging.stage(path, &bytes)?;
                 let (width, height) = (picture.width(), picture.height());
                 written.push(Written::new(role, name, path, width, height));
                 Ok(())
@@ -218,7 +218,7 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Vec
     }
 
     // All is computed: now the files get their names, all or none.
-    session.staging.commit(session, request.force)?;
+    session.staging.commit(request.force)?;
     if let Some(bytes) = piped {
         to_stdout(&bytes)?;
     }
