@@ -476,7 +476,8 @@ mod program {
         for name in ["sheet.png", "tile_01.png", "tile_02.png", "tiling_01.png", "tiling_02.png"] {
             std::fs::remove_file(folder.at(format!("bare/{name}"))).expect("removed");
         }
-        folder.refuses(&to(&["-o", "bare"]), 1, "tile_02_height.png exists already");
+        let args = ["extract", "cloth.png", "-o", "bare", "--period", "70x16"];
+        folder.refuses(&args, 1, "tile_02_height.png exists already");
     }
 
     #[test]

@@ -484,7 +484,8 @@ mod program {
 
         // What would be overwritten is found before the work.
         std::fs::remove_file(folder.at("rows.png")).expect("removed");
-        let output = run(&folder, &[&args[..], &["-o", "rows.png"]].concat());
+        let args = ["wall.png", "--lattice", LATTICE, "--block", "999", "-o", "rows.png"];
+        let output = run(&folder, &args);
         let said = String::from_utf8_lossy(&output.stderr);
         assert!(said.contains("rows_height.png exists already"), "{said}");
         assert!(!folder.at("rows.png").exists());

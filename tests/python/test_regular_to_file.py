@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import _thread
 import inspect
+import subprocess
+import sys
 import threading
 import typing
 from typing import TYPE_CHECKING, Any
@@ -98,6 +100,21 @@ def test_a_texture_of_several_strips_is_that_of_one(tmp_path: Path) -> None:
     assert shares == sorted(shares)
     assert (shares[0], shares[-1]) == (0, 1)
     assert len(shares) > 10
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the unit is Linux's")
+def test_memory_does_not_grow_with_the_height(tmp_path: Path) -> None:
+    script = (
+        "import resource, sys, numpy as np, texforge\n"
+        "photo = np.random.default_rng(0).integers(0, 256, (64, 64), dtype=np.uint8)\n"
+        "texforge.regular_to_file(photo, sys.argv[1], size=(36000, 1000), lattice='none',\n"
+        "                         candidates=1, seam='linear', flatten=0)\n"
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)\n"
+    )
+    command = [sys.executable, "-c", script, str(tmp_path / "a.png")]
+    result = subprocess.run(command, capture_output=True, text=True, check=True, timeout=300)
+    # All places and what is mixed with them would take this many bytes.
+    assert int(result.stdout) * 1024 < 36_000 * 1000 * (8 + 8 + 1)
 
 
 def test_same_bytes_for_any_number_of_threads_and_with_what_was_chosen(tmp_path: Path) -> None:
