@@ -4,8 +4,9 @@
 and says which pixel of the photo each of its pixels is, so that other maps of the same material
 can follow (`apply`). `palette` shows how even it can become. `detect_lattice` finds by which
 displacements a photo of bricks, tiles or cloth repeats, `extract` cuts out the tile of such a photo
-that stands best for all of it, `regular` makes a texture of any size from it. `fit_noise` makes
-a procedural texture of a photo: a kilobyte that has a value at every point. `texture_cost`
+that stands best for all of it, `regular` makes a texture of any size from it, `regular_to_file`
+one larger than memory. `fit_noise` makes a procedural texture of a photo: a kilobyte that has a
+value at every point. `texture_cost`
 measures how much a texture looks like its photo.
 `read_image` and `write_image` keep all the bits that files have. `study` compares the ways to
 tile over many photos.
@@ -42,7 +43,7 @@ from texforge._lattice import detect_lattice
 from texforge._measure import texture_cost
 from texforge._noise import NoiseTexture, fit_noise
 from texforge._palette import Palette, palette
-from texforge._regular import regular
+from texforge._regular import regular, regular_to_file
 from texforge._study import Study, study
 from texforge._texforge import __version__
 from texforge._types import (
@@ -66,6 +67,8 @@ from texforge._types import (
     ProgressBar,
     Quality,
     Regular,
+    RegularFile,
+    RegularOptions,
     SampleType,
     Scaling,
     Seam,
@@ -119,6 +122,8 @@ __all__ = [
     "Quality",
     "ReadError",
     "Regular",
+    "RegularFile",
+    "RegularOptions",
     "SameFileError",
     "SampleType",
     "Scaling",
@@ -144,6 +149,7 @@ __all__ = [
     "palette",
     "read_image",
     "regular",
+    "regular_to_file",
     "study",
     "texture_cost",
     "tile",

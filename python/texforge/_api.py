@@ -505,10 +505,7 @@ def write_image(
     """
     picture = _arrays.picture(image, "the picture", encoding if kind == "color" else "data")
     _texforge.write(
-        path=_arrays.path(path),
-        picture=picture.packed(),
-        kind=_arrays.word("kind", kind),
-        record=None,
+        files=[(_arrays.path(path), picture.packed(), _arrays.word("kind", kind), None)],
         overwrite=bool(overwrite),
     )
 
@@ -564,13 +561,10 @@ def save_texture(texture: Texture, path: PathType, *, verb: str, overwrite: bool
     }
     if "redo" in texture.report:
         made["redo"] = texture.report["redo"]
-    _texforge.write(
-        path=_arrays.path(path),
-        picture=_arrays.picture(texture.image, f"the {verb}", texture.encoding).packed(),
-        kind="data" if texture.encoding == "data" else "color",
-        record=json.dumps(made, sort_keys=True, separators=(",", ":")),
-        overwrite=bool(overwrite),
-    )
+    picture = _arrays.picture(texture.image, f"the {verb}", texture.encoding).packed()
+    kind = "data" if texture.encoding == "data" else "color"
+    record = json.dumps(made, sort_keys=True, separators=(",", ":"))
+    _texforge.write(files=[(_arrays.path(path), picture, kind, record)], overwrite=bool(overwrite))
 
 
 def preview_png(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import json
 from collections.abc import Mapping  # noqa: TC003 (the signatures can be resolved at run time)
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from texforge import _api, _arrays, _texforge
-from texforge._errors import ParameterError
+from texforge._errors import ParameterError, from_core
 from texforge._progress import reporting
 from texforge._types import (  # noqa: TC001 (the signatures can be resolved at run time)
     Encoding,
@@ -21,6 +22,8 @@ from texforge._types import (  # noqa: TC001 (the signatures can be resolved at 
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     import numpy.typing as npt
 
     from texforge._types import PathType
@@ -135,7 +138,9 @@ class Extraction:
     report: dict[str, Any]
 
     def save(self, folder: PathType, *, overwrite: bool = False) -> list[Path]:
-        """Write the tiles, their maps and tilings and the sheet, named as by ``texforge extract``.
+        """Write the tiles, their maps and tilings and the sheet: all of these files or none.
+
+        They are named as by ``texforge extract``.
 
         Parameters
         ----------
@@ -153,33 +158,29 @@ class Extraction:
         Raises
         ------
         OutputExistsError
-            If one of the files exists and `overwrite` is False.
+            If one of the files exists and `overwrite` is False (also a FileExistsError).
+        MissingFileError, AccessError, FileError
+            If the operating system refuses (also FileNotFoundError, PermissionError, OSError).
         """
         base = Path(_arrays.path(folder))
-        base.mkdir(exist_ok=True)
-        files: list[Path] = []
+        files: list[tuple[str, Any, str, str | None]] = []
 
-        def write(name: str, image: npt.NDArray[Any], kind: str, encoding: Encoding) -> None:
+        def add(name: str, image: npt.NDArray[Any], kind: str, encoding: Encoding) -> None:
             path = base / f"{name}.{'exr' if image.dtype.kind == 'f' else 'png'}"
-            _texforge.write(
-                path=str(path),
-                picture=_arrays.picture(image, name, encoding).packed(),
-                kind=kind,
-                record=None,
-                overwrite=bool(overwrite),
-            )
-            files.append(path)
+            files.append((str(path), _arrays.picture(image, name, encoding).packed(), kind, None))
 
         for number, tile in enumerate(self.tiles, 1):
             kind = "data" if tile.encoding == "data" else "color"
-            write(f"tile_{number:02}", tile.image, kind, tile.encoding)
+            add(f"tile_{number:02}", tile.image, kind, tile.encoding)
             for name, image in tile.maps.items():
                 of_map = _texforge.map_kind(name)
                 encoding: Encoding = "data" if of_map != "color" else tile.encoding
-                write(f"tile_{number:02}_{name}", image, of_map, encoding)
-            write(f"tiling_{number:02}", tile.tiling(), kind, tile.encoding)
-        write("sheet", self.sheet, "color", "srgb")
-        return files
+                add(f"tile_{number:02}_{name}", image, of_map, encoding)
+            add(f"tiling_{number:02}", tile.tiling(), kind, tile.encoding)
+        add("sheet", self.sheet, "color", "srgb")
+        with _folder(base):
+            _texforge.write(files=files, overwrite=bool(overwrite))
+        return [Path(path) for path, *_ in files]
 
     def __repr__(self) -> str:
         """Say what it is in one line."""
@@ -189,6 +190,23 @@ class Extraction:
     def _repr_png_(self) -> bytes:
         """Return the sheet, for notebooks."""
         return _api.png(self.sheet)
+
+
+@contextlib.contextmanager
+def _folder(path: Path) -> Iterator[None]:
+    """Make a folder if it is not there, and take it away again if what follows fails."""
+    was_there = path.is_dir()
+    try:
+        path.mkdir(exist_ok=True)
+    except OSError as error:
+        fields = {"action": "write", "path": str(path), "errno": error.errno}
+        raise from_core("io", f"cannot write {path}: {error.strerror}", fields) from None
+    try:
+        yield
+    except BaseException:
+        if not was_there:
+            path.rmdir()
+        raise
 
 
 def extract(

@@ -760,7 +760,7 @@ class NoiseTexture:
         name: str = "texture",
         overwrite: bool = False,
     ) -> list[Path]:
-        """Write the files of `export` into a folder that exists, each at once or not at all.
+        """Write the files of `export` into a folder that exists: all of them or none.
 
         Parameters
         ----------

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 from collections.abc import Mapping  # noqa: TC003 (the signatures can be resolved at run time)
-from typing import Any, Literal
+from pathlib import Path
+from typing import Any, Literal, Unpack
 
 from texforge import _api, _arrays, _texforge
 from texforge._progress import reporting
@@ -13,14 +15,17 @@ from texforge._types import (
     ImageLike,
     Lattice,
     Matching,
+    PathType,
     Progress,
     Regular,
+    RegularFile,
+    RegularOptions,
     Seam,
     Straightening,
     Tileable,
 )
 
-__all__ = ["regular"]
+__all__ = ["regular", "regular_to_file"]
 
 
 def regular(
@@ -159,41 +164,131 @@ def regular(
     >>> texforge.regular(wall, tileable="both").image.shape
     (96, 112)
     """
-    values = dict(locals())
-    photo = _arrays.picture(image, "the photo", encoding)
-    texts = [
-        (param["name"], _api.parameter_text(param, values[param["name"]]))
-        for param in _texforge.schema("regular")
-    ]
-    others = {name: _api.maps_of(other, name, 0) for name, other in (maps or {}).items()}
+    photo, others, arguments = _packed(dict(locals()))
     with reporting(progress) as callback:
         picture, source_map, of_maps, report_text = _texforge.regular(
-            photo=photo.packed(),
-            mask=None if mask is None else _arrays.mask(mask).packed(),
-            maps=[
-                (name, [one.packed() for one in other], _texforge.map_kind(name))
-                for name, other in others.items()
-            ],
-            params=texts,
-            seed=_arrays.integer("seed", seed),
-            threads=_arrays.integer("threads", threads or 0, high=1024),
-            progress=callback,
+            **arguments, progress=callback
         )
-    report = json.loads(report_text)
-    report["notes"] = [*report["notes"], *photo.notes]
     return Regular(
         image=photo.unpacked(picture),
         source_map=_api.map_positions(source_map),
-        seed=report["seed"],
-        params=_api.typed_params("regular", report),
-        report=report,
-        maps={name: others[name][0].unpacked(parts) for name, parts in of_maps},
-        encoding=_arrays.array_encoding(picture[3]),
-        photo_size=(photo.array.shape[0], photo.array.shape[1]),
-        lattice=_vectors(report["lattice"]),
-        lattice_of_texture=_vectors(report["lattice_of_texture"]),
-        confidence=report["confidence"],
+        maps={name: others[name].unpacked(parts) for name, parts in of_maps},
+        **_told(report_text, photo),
     )
+
+
+def regular_to_file(
+    image: ImageLike, path: PathType, *, overwrite: bool = False, **options: Unpack[RegularOptions]
+) -> RegularFile:
+    """Make a texture as `regular` does and write it to a file that may be larger than memory.
+
+    It is written from top to bottom while it is made. The memory that it takes grows with its
+    width, not with its height.
+
+    Parameters
+    ----------
+    image : (H, W) or (H, W, C) array_like, or Pillow image
+        The photo, as for `regular`.
+    path : path
+        The file: ``.png``, ``.tif`` or ``.exr``. Each of the `maps` goes into a file beside it,
+        named after it: ``wall.png`` and ``"normal"`` make ``wall_normal.png``, floats
+        ``wall_normal.exr``.
+    overwrite : bool
+        Whether existing files may be replaced.
+    **options
+        As for `regular`: size, maps, seed, progress and so on.
+
+    Returns
+    -------
+    RegularFile
+        Where the files are, and how the texture was made.
+
+    Raises
+    ------
+    OutputExistsError
+        If one of the files exists and `overwrite` is False (also a FileExistsError).
+    FormatError
+        If the format cannot hold the picture, or is not one of those above (also an OSError).
+    MissingFileError, AccessError, FileError
+        If the operating system refuses (also FileNotFoundError, PermissionError, OSError).
+    NoStructureError, ParameterError, PictureError, OutOfMemory, Cancelled
+        As for `regular`.
+
+    Notes
+    -----
+    The files hold the same pixels as what `regular` returns, and the same bytes as those that it
+    or ``texforge regular`` writes. All of them appear, or none: if it fails or is interrupted,
+    nothing is left behind.
+
+    Examples
+    --------
+    >>> import numpy as np, pathlib, tempfile
+    >>> import texforge
+    >>> y, x = np.mgrid[:96, :112]
+    >>> mortar = (y % 16 < 3) | ((x + y // 16 * 14) % 28 < 3)
+    >>> grain = np.random.default_rng(0).integers(0, 40, (96, 112))
+    >>> bricks = (np.where(mortar, 200, 90) + grain).astype(np.uint8)
+    >>> path = pathlib.Path(tempfile.mkdtemp()) / "wall.png"
+    >>> wall = texforge.regular_to_file(bricks, path, size=(150, 180))
+    >>> wall.size, texforge.read_image(wall.path).shape
+    ((150, 180), (150, 180))
+    """
+    call = inspect.signature(regular).bind(image, **options)
+    call.apply_defaults()
+    photo, others, arguments = _packed(call.arguments)
+    place = _arrays.path(path)
+    with reporting(call.arguments["progress"]) as callback:
+        places, report_text = _texforge.regular_to_file(
+            path=place, overwrite=bool(overwrite), **arguments, progress=callback
+        )
+    told = _told(report_text, photo)
+    width, height = told["report"]["size"]
+    files = dict(zip(others, places, strict=True))
+    return RegularFile(path=Path(place), maps=files, size=(height, width), **told)
+
+
+def _packed(
+    values: Mapping[str, Any],
+) -> tuple[_arrays.Picture, dict[str, _arrays.Picture], dict[str, Any]]:
+    """Return the photo, its further maps by name, and the arguments of the core but progress."""
+    photo = _arrays.picture(values["image"], "the photo", values["encoding"])
+    others = {
+        name: _api.maps_of(other, name, 0)[0] for name, other in (values["maps"] or {}).items()
+    }
+    mask = values["mask"]
+    return (
+        photo,
+        others,
+        {
+            "photo": photo.packed(),
+            "mask": None if mask is None else _arrays.mask(mask).packed(),
+            "maps": [
+                (name, [other.packed()], _texforge.map_kind(name)) for name, other in others.items()
+            ],
+            "params": [
+                (param["name"], _api.parameter_text(param, values[param["name"]]))
+                for param in _texforge.schema("regular")
+            ],
+            "seed": _arrays.integer("seed", values["seed"]),
+            "threads": _arrays.integer("threads", values["threads"] or 0, high=1024),
+        },
+    )
+
+
+def _told(report_text: str, photo: _arrays.Picture) -> dict[str, Any]:
+    """Return what is known of a texture besides its pixels."""
+    report = json.loads(report_text)
+    report["notes"] = [*report["notes"], *photo.notes]
+    return {
+        "seed": report["seed"],
+        "params": _api.typed_params("regular", report),
+        "report": report,
+        "encoding": _arrays.array_encoding(photo.encoding),
+        "photo_size": (photo.array.shape[0], photo.array.shape[1]),
+        "lattice": _vectors(report["lattice"]),
+        "lattice_of_texture": _vectors(report["lattice_of_texture"]),
+        "confidence": report["confidence"],
+    }
 
 
 def _vectors(basis: Any) -> tuple[tuple[float, float], tuple[float, float]] | None:

@@ -1,6 +1,7 @@
 """The compiled module. Private: `_api.py` is its only caller."""
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, final
 
 _Picture = tuple[Any, str, tuple[int, int, int], str]
@@ -38,6 +39,7 @@ __all__ = [
     "read",
     "read_source_map",
     "regular",
+    "regular_to_file",
     "schema",
     "texture_cost",
     "tiles",
@@ -165,15 +167,25 @@ def regular(
     threads: int,
     progress: Callable[[float], object] | None,
 ) -> tuple[_PictureOut, _MapOut, list[tuple[str, _PictureOut]], str]: ...
+def regular_to_file(
+    *,
+    path: str,
+    photo: _Picture,
+    mask: _Picture | None,
+    maps: list[tuple[str, list[_Picture], str]],
+    params: list[tuple[str, str]],
+    seed: int,
+    overwrite: bool,
+    threads: int,
+    progress: Callable[[float], object] | None,
+) -> tuple[list[Path], str]: ...
 def lattice_overlay(*, picture: _Picture, v1: _Vector, v2: _Vector) -> _PictureOut: ...
 def lattice_snap(
     *, v1: _Vector, v2: _Vector, width: int, height: int
 ) -> tuple[int, int, list[float], list[list[int]], list[float]] | None: ...
 def apply(*, source_map: _Map, pictures: list[_Picture], kind: str) -> _PictureOut: ...
 def read(*, path: str, kind: str) -> _PictureOut: ...
-def write(
-    *, path: str, picture: _Picture, kind: str, record: str | None, overwrite: bool
-) -> None: ...
+def write(*, files: list[tuple[str, _Picture, str, str | None]], overwrite: bool) -> None: ...
 def export_targets() -> list[str]: ...
 def write_files(*, files: list[tuple[str, bytes]], overwrite: bool) -> None: ...
 def encode_png(*, picture: _Picture) -> bytes: ...

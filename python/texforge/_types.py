@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
+from pathlib import Path  # noqa: TC003 (the annotations can be resolved at run time)
 from typing import (
     TYPE_CHECKING,
     Any,
@@ -43,6 +44,8 @@ __all__ = [
     "ProgressBar",
     "Quality",
     "Regular",
+    "RegularFile",
+    "RegularOptions",
     "SampleType",
     "Scaling",
     "Seam",
@@ -168,6 +171,31 @@ class TileOptions(TypedDict, total=False):
     threads: int | None
     progress: Progress
     trace: bool
+
+
+class RegularOptions(TypedDict, total=False):
+    """The options of `texforge.regular`, for `texforge.regular_to_file`."""
+
+    size: int | tuple[int, int] | None
+    tileable: Tileable
+    lattice: Literal["auto", "none"] | Lattice | tuple[tuple[float, float], tuple[float, float]]
+    min_confidence: float
+    straighten: Straightening
+    block: int | None
+    border: int | None
+    candidates: int
+    tolerance: int
+    matching: Matching
+    deform: int
+    seam: Seam
+    feather: int
+    flatten: float | None
+    seed: int
+    mask: ImageLike | None
+    maps: Mapping[str, ImageLike] | None
+    encoding: Encoding | Literal["auto"]
+    threads: int | None
+    progress: Progress
 
 
 class Image(np.ndarray[Any, np.dtype[Any]]):
@@ -662,3 +690,52 @@ class Regular(Texture):
         tileable = self.params["tileable"]
         times = (1 + (tileable in ("both", "y")), 1 + (tileable in ("both", "x")))
         return _api.preview_png(self.image, self.encoding, times)
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class RegularFile:
+    """A near-regular texture in a file, made by `texforge.regular_to_file`.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    maps : dict of str to Path
+        The files of the other maps of the material, by name.
+    size : (int, int)
+        Height and width of the texture in pixels.
+    lattice : ((float, float), (float, float)) or None
+        As of `Regular`.
+    lattice_of_texture : ((float, float), (float, float)) or None
+        As of `Regular`.
+    confidence : float or None
+        As of `Regular`.
+    seed : int
+        Seed of all random choices.
+    params : dict
+        Every parameter that was used, as of `Regular`: ``regular_to_file(photo, path, **params)``
+        makes the same file again.
+    report : dict
+        How the texture was made, as of `Regular`.
+    encoding : {"srgb", "linear", "data"}
+        What the texture's numbers mean.
+    photo_size : (int, int)
+        Height and width of the photo.
+    """
+
+    path: Path
+    maps: dict[str, Path]
+    size: tuple[int, int]
+    lattice: tuple[tuple[float, float], tuple[float, float]] | None
+    lattice_of_texture: tuple[tuple[float, float], tuple[float, float]] | None
+    confidence: float | None
+    seed: int
+    params: dict[str, Any]
+    report: dict[str, Any]
+    encoding: Encoding
+    photo_size: tuple[int, int]
+
+    def __repr__(self) -> str:
+        """Say what it is in one line."""
+        height, width = self.size
+        return f"RegularFile({str(self.path)!r}, {height} x {width}, seed {self.seed})"

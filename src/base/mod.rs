@@ -4,4 +4,5 @@ pub mod ctx;
 pub mod error;
 pub mod memory;
 pub mod params;
+pub(crate) mod record;
 pub mod rng;

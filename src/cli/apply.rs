@@ -78,8 +78,8 @@ fn work(session: &Session, request: &Request) -> Result<serde_json::Value> {
     match target {
         None => to_stdout(&bytes)?,
         Some(path) => {
-            session.staging.stage(session, path, &bytes)?;
-            session.staging.commit(session, request.force)?;
+            session.staging.stage(path, &bytes)?;
+            session.staging.commit(request.force)?;
         }
     }
     let place = target.unwrap_or(Path::new("-"));

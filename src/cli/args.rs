@@ -130,21 +130,9 @@ fn tile() -> Command {
                  --sigma: floats are sigma itself, of integers black is 0.01, mid grey 0.1 and white 1, in even factors")
                 .long("sigma-map"),
         )
-        .arg(
-            Arg::new("map")
-                .long("map")
-                .value_name("NAME=FILE")
-                .action(ArgAction::Append)
-                .value_parser(ValueParser::os_string())
-                .help(format!(
-                    "A further map of the same surface that follows the tile pixel by pixel; may be \
-                     repeated, and comes once for each photo, in their order. NAME is one of {}. Maps whose file name is the photo's with such an \
-                     ending are taken by themselves",
-                    maps::known_names()
-                )),
-        )
+        .args(maps::flags("A further map of the same surface that follows the tile pixel by pixel; may be repeated, and \
+             comes once for each photo, in their order"))
         .args(redo())
-        .arg(switch("no-maps", "Leave alone the maps that lie beside the photo"))
         .next_help_heading("Outputs")
         .arg(
             Arg::new("variants")

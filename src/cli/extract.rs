@@ -1,6 +1,5 @@
 //! `texforge extract`.
 
-use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use clap::{ArgMatches, Command};
@@ -9,15 +8,16 @@ use serde_json::json;
 
 use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
-use crate::cli::maps::{self, Wanted};
+use crate::base::record::{Typed, record_of, typed_params};
+use crate::cli::maps::{self, Asked, Map};
 use crate::cli::show::duration;
 use crate::cli::small::{SCHEMA_VERSION, print_json};
 use crate::cli::sources::Sources;
-use crate::cli::summary::{Seconds, Typed, Written, record_of, typed_params};
+use crate::cli::summary::{Seconds, Written};
 use crate::cli::work::{Session, supervise};
 use crate::cli::{args, files};
 use crate::image::mask::Mask;
-use crate::image::material::MapKind;
+use crate::image::material::{MapKind, output_path};
 use crate::image::picture::Picture;
 use crate::verb::extract::{ExtractParams, Extraction, extract};
 use crate::verb::inputs::Inputs;
@@ -48,7 +48,7 @@ pub(super) fn command() -> Command {
         .args(ExtractParams::schema().into_iter().map(args::flag))
         .next_help_heading("Inputs")
         .arg(Sources::mask())
-        .arg(maps::flag("A further map of the same surface, cut at the same places (tile_01_NAME.png); may be repeated"))
+        .args(maps::flags("A further map of the same surface, cut at the same places (tile_01_NAME.png); may be repeated"))
         .next_help_heading("Outputs")
         .arg(args::switch("save-source-maps", "Also write which photo pixel each tile pixel is (tile_01_source.exr), for \
              `texforge apply`; the photo must not be scaled then"));
@@ -62,7 +62,7 @@ struct Request {
     folder: PathBuf,
     params: ExtractParams,
     mask: Option<PathBuf>,
-    maps: Vec<Wanted>,
+    maps: Asked,
     source_maps: bool,
     force: bool,
 }
@@ -107,13 +107,12 @@ struct Tile {
 /// Whatever keeps it from being done; then no file was written.
 pub(super) fn run(matches: &ArgMatches) -> Result<()> {
     let path = |id| matches.get_one::<PathBuf>(id).cloned();
-    let maps = matches.get_many::<OsString>("map").into_iter().flatten();
     let request = Request {
         photo: path("photo").unwrap_or_default(),
         folder: path("output").unwrap_or_default(),
         params: ExtractParams::from_texts(args::text(matches))?,
         mask: path("mask"),
-        maps: maps::typed(maps, 1)?,
+        maps: Asked::from(matches, 1)?,
         source_maps: matches.get_flag("save-source-maps"),
         force: matches.get_flag("force"),
     };
@@ -136,9 +135,25 @@ fn name(role: &str, i: usize, like: &Picture) -> String {
     format!("{role}_{:02}.{extension}", i + 1)
 }
 
+/// The same of its source map.
+fn source_name(i: usize) -> String {
+    format!("tile_{:02}_source.exr", i + 1)
+}
+
 impl Request {
+    /// The files that are read besides those of the maps.
+    fn inputs(&self) -> Vec<&Path> {
+        [&self.photo].into_iter().chain(&self.mask).map(PathBuf::as_path).collect()
+    }
+
+    /// Where the pieces of a map go, one of each tile of `photo`.
+    fn places_of(&self, photo: &Picture, map: &str, picture: &Picture) -> Vec<PathBuf> {
+        let place = |i| output_path(&self.folder.join(name("tile", i, photo)), map, picture);
+        (0..self.params.count).map(place).collect()
+    }
+
     /// Fails if the folder cannot be, or holds one of the files already.
-    fn check_places(&self, photo: Option<&Picture>, maps: &[Picture]) -> Result<()> {
+    fn check_places(&self, photo: Option<&Picture>, maps: &[Map]) -> Result<()> {
         let folder = &self.folder;
         if folder == Path::new("-") {
             return Err(Error::parameter("output", "a folder, as there are several files", "`-`"));
@@ -157,24 +172,21 @@ impl Request {
         if !folder.is_dir() {
             return Err(Error::Exists { path: folder.clone() });
         }
-        let mut names = vec!["sheet.png".to_owned()];
+        let mut files = vec![folder.join("sheet.png")];
         for i in 0..self.params.count {
-            names.extend(photo.map(|photo| name("tile", i, photo)));
-            names.extend(photo.map(|photo| name("tiling", i, photo)));
-            names.extend(self.source_maps.then(|| format!("tile_{:02}_source.exr", i + 1)));
-            let tile = photo.map(|photo| folder.join(name("tile", i, photo)));
-            for (wanted, map) in self.maps.iter().zip(maps) {
-                let path = tile.as_ref().map(|tile| maps::output_path(tile, wanted.name, map));
-                names
-                    .extend(path.and_then(|p| Some(p.file_name()?.to_string_lossy().into_owned())));
-            }
+            files.extend(photo.map(|photo| folder.join(name("tile", i, photo))));
+            files.extend(photo.map(|photo| folder.join(name("tiling", i, photo))));
+            files.extend(self.source_maps.then(|| folder.join(source_name(i))));
         }
-        let mut inputs: Vec<&Path> = vec![&self.photo];
-        inputs.extend(self.mask.iter().map(PathBuf::as_path));
-        inputs.extend(self.maps.iter().flat_map(|m| &m.paths).map(PathBuf::as_path));
-        names
-            .iter()
-            .try_for_each(|name| files::check_place(&folder.join(name), &inputs, self.force))
+        for Map { wanted, pictures } in maps {
+            files.extend(
+                photo.iter().flat_map(|photo| self.places_of(photo, wanted.name, &pictures[0])),
+            );
+        }
+        let mut inputs = self.inputs();
+        inputs.extend(self.maps.paths());
+        inputs.extend(maps.iter().flat_map(|m| &m.wanted.paths).map(PathBuf::as_path));
+        files.iter().try_for_each(|file| files::check_place(file, &inputs, self.force))
     }
 }
 
@@ -187,7 +199,10 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Vec
         None => None,
         Some(path) => Some(Mask::from_picture(&files::read(path, MapKind::Color)?)?),
     };
-    let maps = maps::read(session, &request.maps, &Inputs::new(&photo), &TileParams::default())?;
+    let photos = std::slice::from_ref(&request.photo);
+    let made_of = (photos, &Inputs::new(&photo), &TileParams::default());
+    let places = |name: &str, map: &Picture| request.places_of(&photo, name, map);
+    let maps = request.maps.read(session, made_of, &request.inputs(), places, &mut notes)?;
     request.check_places(Some(&photo), &maps)?;
     let first = request.folder.join(name("tile", 0, &photo));
     files::ensure_can_hold(&photo, Some(&first), MapKind::Color)?;
@@ -212,7 +227,7 @@ fn write(
     session: &Session,
     request: &Request,
     made: &Extraction,
-    maps: &[Picture],
+    maps: &[Map],
 ) -> Result<Vec<Written>> {
     let mut all: Vec<(Written, Vec<u8>)> = Vec::new();
     let mut add =
@@ -224,8 +239,8 @@ fn write(
             Ok::<_, Error>(())
         };
     let mut of_maps = Vec::new();
-    for (wanted, map) in request.maps.iter().zip(maps) {
-        of_maps.push((wanted, made.tiles_of(map, wanted.kind)?));
+    for Map { wanted, pictures } in maps {
+        of_maps.push((wanted, made.tiles_of(&pictures[0], wanted.kind)?));
     }
     let mut source_maps = Vec::new();
     for (i, tile) in made.tiles.iter().enumerate() {
@@ -233,14 +248,14 @@ fn write(
         let file = name("tile", i, picture);
         add("tile", None, &file, picture, MapKind::Color, Some(&record(made, i)))?;
         for (wanted, tiles) in &of_maps {
-            let path = maps::output_path(Path::new(&file), wanted.name, &tiles[i]);
+            let path = output_path(Path::new(&file), wanted.name, &tiles[i]);
             let path = path.to_string_lossy();
             add("map", Some(wanted.name), &path, &tiles[i], wanted.kind, None)?;
         }
         let tiling = made.tiling(i)?;
         add("tiling", None, &name("tiling", i, picture), &tiling, MapKind::Color, None)?;
         if let Some(map) = made.source_map(i).filter(|_| request.source_maps) {
-            let path = request.folder.join(format!("tile_{:02}_source.exr", i + 1));
+            let path = request.folder.join(source_name(i));
             let bytes = files::encode_source_map(map, &path)?;
             let written = Written::new("source_map", None, &path, map.width(), map.height());
             source_maps.push((written, bytes));
@@ -252,9 +267,9 @@ fn write(
         std::fs::create_dir(&request.folder).map_err(Error::io("write", &request.folder))?;
     }
     for (written, bytes) in &all {
-        session.staging.stage(session, Path::new(&written.path), bytes)?;
+        session.staging.stage(Path::new(&written.path), bytes)?;
     }
-    session.staging.commit(session, request.force)?;
+    session.staging.commit(request.force)?;
     Ok(all.into_iter().map(|(written, _)| written).collect())
 }
 

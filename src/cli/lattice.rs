@@ -56,7 +56,7 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<Lattice> {
     let stage = |path: &Path, picture: &Picture, kind| {
         session.check()?;
         let bytes = files::encode(picture, Some(path), kind, None)?;
-        session.staging.stage(session, path, &bytes)
+        session.staging.stage(path, &bytes)
     };
     if let Some(path) = &request.overlay {
         stage(path, &lattice.overlay(&photo)?, MapKind::Color)?;
@@ -66,7 +66,7 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<Lattice> {
         let exact = Format::from_extension(path) == Some(Format::Exr);
         stage(path, &if exact { map } else { grey(&map)? }, MapKind::Data)?;
     }
-    session.staging.commit(session, request.force)?;
+    session.staging.commit(request.force)?;
     Ok(lattice)
 }
 

@@ -4,12 +4,12 @@ use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 
 use clap::builder::ValueParser;
-use clap::{Arg, ArgAction};
+use clap::{Arg, ArgAction, ArgMatches};
 
 use crate::base::error::{Error, Result};
-use crate::cli::files;
 use crate::cli::work::Session;
-use crate::image::material::{MapKind, MapName};
+use crate::cli::{args, files};
+use crate::image::material::{MapKind, MapName, Sibling};
 use crate::image::picture::Picture;
 use crate::verb::inputs::Inputs;
 use crate::verb::params::TileParams;
@@ -41,7 +41,7 @@ pub(super) fn typed<'a>(
         let Some((name, path)) = split(spec) else {
             return Err(Error::parameter("map", "NAME=FILE, e.g. normal=brick_nrm.png", shown()));
         };
-        let Some(MapName { name, kind, .. }) = files::map_of_name(&name) else {
+        let Some(MapName { name, kind, .. }) = MapName::named(&name) else {
             let expected = format!("NAME=FILE where NAME is one of {}", known_names());
             return Err(Error::parameter("map", expected, shown()));
         };
@@ -72,25 +72,158 @@ pub(super) fn flag(what: &str) -> Arg {
         .help(format!("{what}. NAME is one of {}", known_names()))
 }
 
-/// Reads maps of one photo, which must fit it.
-///
-/// # Errors
-/// Of a file that cannot be read, or does not fit.
-pub(super) fn read(
-    session: &Session,
-    wanted: &[Wanted],
-    photo: &Inputs<'_>,
-    params: &TileParams,
-) -> Result<Vec<Picture>> {
-    let read = |wanted: &Wanted| {
-        session.check()?;
-        let map = files::read(&wanted.paths[0], wanted.kind)?;
-        map.ensure_finite(&format!("the map `{}`", wanted.name))?;
-        let shown = format!("{} ({})", wanted.name, wanted.paths[0].display());
-        photo.ensure_maps_fit(&shown, &[&map], wanted.kind, params)?;
-        Ok(map)
-    };
-    wanted.iter().map(read).collect()
+/// The flags of a command that also takes the maps beside its photos.
+pub(super) fn flags(what: &str) -> [Arg; 2] {
+    let map = flag(what);
+    let help = map.get_help().cloned().unwrap_or_default();
+    [
+        map.help(format!(
+            "{help}. Maps whose file name is the photo's with such an ending are taken by themselves"
+        )),
+        args::switch("no-maps", "Leave alone the maps that lie beside the photo"),
+    ]
+}
+
+/// The maps that a run is to take along.
+#[derive(Debug)]
+pub(super) struct Asked {
+    /// Those that were typed.
+    pub(super) typed: Vec<Wanted>,
+    /// Whether those that lie beside the photos are taken too.
+    pub(super) pick_up: bool,
+}
+
+/// A map that was read, of each photo.
+#[derive(Debug)]
+pub(super) struct Map {
+    pub(super) wanted: Wanted,
+    pub(super) pictures: Vec<Picture>,
+}
+
+impl Asked {
+    /// What was typed for `n_photos` with [`flags`].
+    ///
+    /// # Errors
+    /// Those of [`typed`].
+    pub(super) fn from(matches: &ArgMatches, n_photos: usize) -> Result<Self> {
+        let specs = matches.get_many::<OsString>("map").into_iter().flatten();
+        Ok(Self { typed: typed(specs, n_photos)?, pick_up: !matches.get_flag("no-maps") })
+    }
+
+    /// The files of the maps that were typed.
+    pub(super) fn paths(&self) -> impl Iterator<Item = &Path> {
+        self.typed.iter().flat_map(|map| &map.paths).map(PathBuf::as_path)
+    }
+
+    /// Reads the maps that were typed and those that lie beside `photos`; `taken` are the other files
+    /// that the run reads, `places` says where a map's outputs go. Of the maps that were found, those
+    /// that do not fit are left out with a note: nobody asked for them.
+    ///
+    /// # Errors
+    /// Of a map that was typed: it cannot be read, or does not fit.
+    pub(super) fn read(
+        &self,
+        session: &Session,
+        (photos, inputs, params): (&[PathBuf], &Inputs<'_>, &TileParams),
+        taken: &[&Path],
+        places: impl Fn(&str, &Picture) -> Vec<PathBuf>,
+        notes: &mut Vec<String>,
+    ) -> Result<Vec<Map>> {
+        let mut all = self.typed.clone();
+        if self.pick_up {
+            all.extend(self.beside(photos, taken, notes)?);
+        }
+        let mut maps = Vec::new();
+        for wanted in all {
+            let shown = wanted.paths[0].display().to_string();
+            match wanted.read(session, inputs, params) {
+                Ok(pictures) => {
+                    if wanted.found {
+                        let own = |to: &PathBuf| wanted.paths.iter().any(|p| same_place(to, p));
+                        if places(wanted.name, &pictures[0]).iter().any(own) {
+                            // What an earlier run made of a map is no map of the photo.
+                            notes.push(format!(
+                                "{shown} was left alone: it is where this run's map goes"
+                            ));
+                            continue;
+                        }
+                        let name = &wanted.name;
+                        session.console.say(&format!(
+                            "{shown}: taken as the photo's {name} map (--no-maps leaves it alone)"
+                        ));
+                    }
+                    maps.push(Map { wanted, pictures });
+                }
+                Err(error @ Error::Cancelled) => return Err(error),
+                Err(error) if wanted.found => {
+                    notes.push(format!("{shown} was left alone: {error}"));
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(maps)
+    }
+
+    /// The maps that lie beside the photos and were not typed: those that every photo has.
+    fn beside(
+        &self,
+        photos: &[PathBuf],
+        taken: &[&Path],
+        notes: &mut Vec<String>,
+    ) -> Result<Vec<Wanted>> {
+        let taken: Vec<&Path> = self.paths().chain(taken.iter().copied()).collect();
+        let mut found: Vec<Vec<Sibling>> = Vec::new();
+        for photo in photos {
+            let mut siblings = files::siblings(photo)?;
+            siblings.retain(|s| {
+                let typed = self.typed.iter().any(|m| m.name == s.name);
+                !typed && !taken.iter().any(|taken| same_place(taken, &s.path))
+            });
+            found.push(siblings);
+        }
+        // Shown as the photo was typed.
+        let shown = |path: &Path| path.strip_prefix(".").unwrap_or(path).to_owned();
+        let mut wanted = Vec::new();
+        for Sibling { name, kind, path } in found.first().into_iter().flatten() {
+            let of_photo =
+                |all: &Vec<Sibling>| all.iter().find(|s| s.name == *name).map(|s| shown(&s.path));
+            match found.iter().map(of_photo).collect() {
+                Some(paths) => wanted.push(Wanted { name, paths, kind: *kind, found: true }),
+                None => notes.push(format!(
+                    "{} was left alone: not every photo has a {name} map",
+                    shown(path).display()
+                )),
+            }
+        }
+        Ok(wanted)
+    }
+}
+
+impl Wanted {
+    /// Reads the map of each photo; all must fit.
+    fn read(
+        &self,
+        session: &Session,
+        inputs: &Inputs<'_>,
+        params: &TileParams,
+    ) -> Result<Vec<Picture>> {
+        let mut pictures = Vec::new();
+        for path in &self.paths {
+            session.check()?;
+            let map = files::read(path, self.kind)?;
+            map.ensure_finite(&format!("the map `{}`", self.name))?;
+            pictures.push(map);
+        }
+        let all: Vec<&Picture> = pictures.iter().collect();
+        let shown = format!("{} ({})", self.name, self.paths[0].display());
+        inputs.ensure_maps_fit(&shown, &all, self.kind, params)?;
+        Ok(pictures)
+    }
+}
+
+/// Whether two paths name the same file, as far as both exist.
+fn same_place(a: &Path, b: &Path) -> bool {
+    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
 
 /// The names that maps go by, for messages.
@@ -119,24 +252,9 @@ fn split_os(spec: &OsStr) -> Option<(String, OsString)> {
     Some((name.to_owned(), path.into()))
 }
 
-/// Where a map of `tile` goes: `brick.png` and `normal` make `brick_normal.png`, and so does
-/// `brick_basecolor.png`. Integers become PNG, floats EXR, as both keep every bit.
-pub(super) fn output_path(tile: &Path, name: &str, map: &Picture) -> PathBuf {
-    let extension = if map.samples().is_float() { "exr" } else { "png" };
-    let stem = tile.file_stem().unwrap_or_default();
-    let stem = stem.to_str().map_or(stem, |s| OsStr::new(files::without_color_ending(s)));
-    let mut file = stem.to_owned();
-    if !file.is_empty() {
-        file.push("_");
-    }
-    file.push(format!("{name}.{extension}"));
-    tile.with_file_name(file)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::image::picture::{Encoding, Samples};
 
     fn specs(specs: &[&str]) -> Result<Vec<Wanted>> {
         let specs: Vec<OsString> = specs.iter().map(Into::into).collect();
@@ -168,16 +286,5 @@ mod tests {
         assert_eq!(maps[1].paths, [Path::new("h.png"), Path::new("i.png")]);
         let error = typed(all[..3].iter(), 2).expect_err("one height").to_string();
         assert!(error.contains("so height twice, got once"), "{error}");
-    }
-
-    #[test]
-    fn outputs_are_named_after_the_tile() {
-        let of = |samples| Picture::new(1, 1, 1, samples, Encoding::Data).expect("picture");
-        let (int, float) = (of(Samples::U16(vec![7])), of(Samples::F32(vec![0.5])));
-        let name = |tile: &str, map| output_path(Path::new(tile), "normal", map);
-        assert_eq!(name("x/brick.png", &int), Path::new("x/brick_normal.png"));
-        assert_eq!(name("x/brick.tif", &float), Path::new("x/brick_normal.exr"));
-        assert_eq!(name("brick_basecolor.png", &int), Path::new("brick_normal.png"));
-        assert_eq!(name("basecolor.png", &int), Path::new("normal.png"));
     }
 }

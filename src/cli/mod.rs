@@ -17,7 +17,6 @@ mod regular;
 mod show;
 mod small;
 mod sources;
-mod strips;
 pub mod study;
 mod summary;
 mod tile;

@@ -138,7 +138,7 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Vec
         session.check()?;
         let record = summary::record(&tile.report);
         let bytes = files::encode(&tile.picture, Some(path), MapKind::Color, Some(&record))?;
-        session.staging.stage(session, path, &bytes)?;
+        session.staging.stage(path, &bytes)?;
         let (width, height) = tile.report.tile_size;
         let step = Step {
             stationarity: tile.report.stationarity,
@@ -156,8 +156,8 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Vec
         steps.push(step);
     }
     let bytes = files::encode(&sheet, Some(&request.sheet), MapKind::Color, None)?;
-    session.staging.stage(session, &request.sheet, &bytes)?;
-    session.staging.commit(session, request.force)?;
+    session.staging.stage(&request.sheet, &bytes)?;
+    session.staging.commit(request.force)?;
     notes.iter().for_each(|note| session.console.say(&format!("note: {note}")));
     let elapsed = session.console.elapsed();
     let (width, height) = (sheet.width(), sheet.height());

@@ -1,7 +1,6 @@
 //! `texforge regular`.
 
 use std::collections::BTreeMap;
-use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -10,18 +9,18 @@ use serde::Serialize;
 
 use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
-use crate::cli::maps::{self, Wanted};
+use crate::base::record::{record_of, typed_params};
+use crate::cli::maps::{self, Asked, Map};
 use crate::cli::output::{Target, to_stdout};
 use crate::cli::show::duration;
 use crate::cli::small::{SCHEMA_VERSION, print_json};
 use crate::cli::sources::Sources;
-use crate::cli::strips::{self, STRIP_PIXELS};
-use crate::cli::summary::{Seconds, Written, record_of, typed_params};
+use crate::cli::summary::{Seconds, Written};
 use crate::cli::work::{Session, supervise};
 use crate::cli::{args, files};
-use crate::image::io::{Format, WriteOptions};
+use crate::image::io::{Format, STRIP_PIXELS, WriteOptions, write_strips};
 use crate::image::mask::Mask;
-use crate::image::material::MapKind;
+use crate::image::material::{MapKind, output_path};
 use crate::image::picture::Picture;
 use crate::signal::basis::Basis;
 use crate::verb::inputs::Inputs;
@@ -53,7 +52,7 @@ pub(super) fn command() -> Command {
         .args(RegularParams::schema().into_iter().map(args::flag))
         .next_help_heading("Inputs")
         .arg(Sources::mask())
-        .arg(maps::flag("A further map of the same surface that follows the texture pixel by pixel; may be repeated"))
+        .args(maps::flags("A further map of the same surface that follows the texture pixel by pixel; may be repeated"))
         .next_help_heading("Outputs")
         .arg(
             args::file("save-source-map", "FILE.exr", "Also write which photo pixel each pixel is (where two are mixed, the one \
@@ -70,7 +69,7 @@ struct Request {
     output: Target,
     params: RegularParams,
     mask: Option<PathBuf>,
-    maps: Vec<Wanted>,
+    maps: Asked,
     source_map: Option<PathBuf>,
     force: bool,
 }
@@ -112,23 +111,23 @@ struct Summary {
 /// Whatever keeps it from being done; then no file was written.
 pub(super) fn run(matches: &ArgMatches) -> Result<()> {
     let path = |id| matches.get_one::<PathBuf>(id).cloned();
-    let maps = matches.get_many::<OsString>("map").into_iter().flatten();
-    let request = Request {
+    let mut request = Request {
         photo: path("photo").unwrap_or_default(),
         output: Target::typed(&path("output").unwrap_or_default())?,
         params: RegularParams::from_texts(args::text(matches))?,
         mask: path("mask"),
-        maps: maps::typed(maps, 1)?,
+        maps: Asked::from(matches, 1)?,
         source_map: path("save-source-map"),
         force: matches.get_flag("force"),
     };
     let json = matches.get_flag("json");
     if request.output == Target::Stdout {
-        let taken = [("map", !request.maps.is_empty()), ("json", json)];
+        let taken = [("map", !request.maps.typed.is_empty()), ("json", json)];
         if let Some((flag, _)) = taken.into_iter().find(|(_, typed)| *typed) {
             let expected = "left out when the texture goes to standard output";
             return Err(Error::parameter(flag, expected, "`-o -`"));
         }
+        request.maps.pick_up = false;
     }
     let (ctx, session) = Session::begin(matches)?;
     let (summary, line) = supervise(&session, move |session| work(session, &ctx, &request))?;
@@ -137,29 +136,25 @@ pub(super) fn run(matches: &ArgMatches) -> Result<()> {
 }
 
 impl Request {
-    /// Fails if an output cannot be written, or two are the same file.
-    fn check_places(&self, maps: &[Picture]) -> Result<()> {
-        let mut inputs: Vec<&Path> = vec![&self.photo];
-        inputs.extend(self.mask.iter().map(PathBuf::as_path));
-        inputs.extend(self.maps.iter().flat_map(|m| &m.paths).map(PathBuf::as_path));
-        let maps = self.maps.iter().zip(maps).map(|(wanted, map)| self.place_of(wanted, map));
-        let all = self.output.file().map(Path::to_owned).into_iter();
-        let all = all.chain(self.source_map.clone()).chain(maps);
-        let mut seen: Vec<PathBuf> = Vec::new();
-        for path in all {
-            files::check_place(&path, &inputs, self.force)?;
-            let absolute = std::path::absolute(&path).map_err(Error::io("write", &path))?;
-            if seen.contains(&absolute) {
-                let got = format!("{} twice", path.display());
-                return Err(Error::parameter("output", "a file of its own for each output", got));
-            }
-            seen.push(absolute);
-        }
-        Ok(())
+    /// The files that are read besides those of the maps.
+    fn inputs(&self) -> Vec<&Path> {
+        [&self.photo].into_iter().chain(&self.mask).map(PathBuf::as_path).collect()
     }
 
-    fn place_of(&self, wanted: &Wanted, map: &Picture) -> PathBuf {
-        maps::output_path(self.output.file().unwrap_or(Path::new("texture.png")), wanted.name, map)
+    /// Fails if an output cannot be written, or two are the same file.
+    fn check_places(&self, maps: &[Map]) -> Result<()> {
+        let mut inputs = self.inputs();
+        inputs.extend(self.maps.paths());
+        inputs.extend(maps.iter().flat_map(|m| &m.wanted.paths).map(PathBuf::as_path));
+        let texture = self.output.file().map(|path| ("output", path.to_owned()));
+        let source_map = self.source_map.clone().map(|path| ("save-source-map", path));
+        let maps = maps.iter().map(|m| ("map", self.place_of(m.wanted.name, &m.pictures[0])));
+        let all = texture.into_iter().chain(source_map).chain(maps);
+        files::check_outputs(all, &inputs, self.force)
+    }
+
+    fn place_of(&self, name: &str, map: &Picture) -> PathBuf {
+        output_path(self.output.file().unwrap_or(Path::new("texture.png")), name, map)
     }
 }
 
@@ -172,7 +167,10 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Str
         None => None,
         Some(path) => Some(Mask::from_picture(&files::read(path, MapKind::Color)?)?),
     };
-    let maps = maps::read(session, &request.maps, &Inputs::new(&photo), &TileParams::default())?;
+    let photos = std::slice::from_ref(&request.photo);
+    let made_of = (photos, &Inputs::new(&photo), &TileParams::default());
+    let places = |name: &str, map: &Picture| vec![request.place_of(name, map)];
+    let maps = request.maps.read(session, made_of, &request.inputs(), places, &mut notes)?;
     request.check_places(&maps)?;
     files::ensure_can_hold(&photo, request.output.file(), MapKind::Color)?;
     session.check()?;
@@ -190,8 +188,10 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Str
     let start = Instant::now();
     let (width, height) = maker.size();
     let mut outputs = Vec::new();
-    for (wanted, of) in request.maps.iter().zip(&maps) {
-        let (name, kind, path) = (Some(wanted.name), wanted.kind, request.place_of(wanted, of));
+    for Map { wanted, pictures } in &maps {
+        let of = &pictures[0];
+        let (name, kind, path) =
+            (Some(wanted.name), wanted.kind, request.place_of(wanted.name, of));
         outputs.push(Output { role: "map", name, path, of, kind, record: None });
     }
     if let Some(path) = request.output.file() {
@@ -207,28 +207,33 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Str
         |output: &Output<'_>| Format::from_extension(&output.path).is_some_and(Format::streams);
     let to_files = request.output != Target::Stdout;
     let mut piped = None;
+    let of_maps: Vec<_> =
+        outputs.iter().filter(|o| o.role == "map").map(|o| (o.of, o.kind)).collect();
     if to_files && request.source_map.is_none() && outputs.iter().all(streams) {
-        write_strips(session, ctx, &maker, &outputs)?;
+        let options =
+            |o: &Output<'_>| WriteOptions { kind: o.kind, record: o.record.clone(), force: true };
+        let files: Vec<_> = outputs.iter().map(|o| (o.path.as_path(), options(o))).collect();
+        let pictures = maker.pictures(ctx, STRIP_PIXELS, &of_maps)?;
+        write_strips(&session.staging, &files, height, pictures)?;
     } else {
-        let of_maps = outputs.iter().filter(|o| o.role == "map").map(|o| (o.of, o.kind));
-        let (texture, of_maps) = maker.make(ctx, &of_maps.collect::<Vec<_>>())?;
+        let (texture, of_maps) = maker.make(ctx, &of_maps)?;
         let pictures = to_files.then_some(&texture.picture).into_iter().chain(&of_maps);
         for (output, picture) in outputs.iter().zip(pictures) {
             session.check()?;
             let record = output.record.as_deref();
             let bytes = files::encode(picture, Some(&output.path), output.kind, record)?;
-            session.staging.stage(session, &output.path, &bytes)?;
+            session.staging.stage(&output.path, &bytes)?;
         }
         if let Some(path) = &request.source_map {
             let bytes = files::encode_source_map(&texture.source_map, path)?;
-            session.staging.stage(session, path, &bytes)?;
+            session.staging.stage(path, &bytes)?;
             files.push(Written::new("source_map", None, path, width, height));
         }
         if !to_files {
             piped = Some(files::encode(&texture.picture, None, MapKind::Color, Some(&record))?);
         }
     }
-    session.staging.commit(session, request.force)?;
+    session.staging.commit(request.force)?;
     if let Some(bytes) = piped {
         to_stdout(&bytes)?;
     }
@@ -240,28 +245,6 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Str
     let elapsed = session.console.elapsed();
     let line = line(request, &report, elapsed);
     Ok((summary(ctx, request, report, files, notes, elapsed.as_secs_f64()), line))
-}
-
-/// Writes all outputs while the texture is made from top to bottom.
-fn write_strips(
-    session: &Session,
-    ctx: &Ctx,
-    maker: &RegularMaker<'_>,
-    outputs: &[Output<'_>],
-) -> Result<()> {
-    let files: Vec<_> = outputs
-        .iter()
-        .map(|Output { path, kind, record, .. }| {
-            let options = WriteOptions { kind: *kind, record: record.clone(), force: true };
-            (path.as_path(), options)
-        })
-        .collect();
-    let pictures = maker.strips(ctx, STRIP_PIXELS)?.map(|strip| {
-        let strip = strip?;
-        let piece = |output: &Output<'_>| strip.picture(output.of, output.kind);
-        ctx.install(|| outputs.iter().map(piece).collect())
-    });
-    strips::write(session, &files, maker.size().1, pictures)
 }
 
 fn line(request: &Request, report: &RegularReport, elapsed: std::time::Duration) -> String {

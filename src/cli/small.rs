@@ -7,6 +7,7 @@ use serde_json::json;
 
 use crate::base::error::{Error, Result};
 use crate::base::params::Param;
+use crate::base::record::typed;
 use crate::cli::output::to_stdout;
 use crate::cli::show::table;
 use crate::cli::work::{Session, supervise, watch_signals};
@@ -74,17 +75,6 @@ fn described(param: &Param) -> serde_json::Value {
         "unit": param.unit,
         "doc": param.doc,
     })
-}
-
-/// A parameter's text as the JSON type that it has.
-pub(super) fn typed(param: &Param, text: &str) -> serde_json::Value {
-    match param.kind {
-        "optional number" if text == "none" => serde_json::Value::Null,
-        "integer" | "number" | "optional number" => {
-            serde_json::from_str(text).unwrap_or_else(|_| text.into())
-        }
-        _ => text.into(),
-    }
 }
 
 /// `texforge info`.

@@ -7,10 +7,11 @@ use std::time::Duration;
 use serde::{Serialize, Serializer};
 
 use crate::base::ctx::Ctx;
-use crate::base::params::{Param, Value as _};
+use crate::base::params::Value as _;
+use crate::base::record::{record_of, typed_params};
 use crate::cli::output::Target;
 use crate::cli::show::duration;
-use crate::cli::small::{SCHEMA_VERSION, typed};
+use crate::cli::small::SCHEMA_VERSION;
 use crate::image::rect::Rect;
 use crate::verb::params::{Measure, Size, TileParams};
 use crate::verb::tile::{Costs, Report};
@@ -108,25 +109,6 @@ pub(super) fn record(report: &Report) -> String {
         record["redo"] = serde_json::json!(rect);
     }
     record.to_string()
-}
-
-/// What every command records in its files.
-pub(super) fn record_of(verb: &str, version: &str, seed: u64, params: &Typed) -> serde_json::Value {
-    serde_json::json!({
-        "tool": "texforge", "version": version, "verb": verb, "seed": seed, "params": params,
-    })
-}
-
-/// Parameters by name.
-pub(super) type Typed = BTreeMap<&'static str, serde_json::Value>;
-
-/// Parameters as numbers and words.
-pub(super) fn typed_params(schema: &[Param], params: &[(&'static str, String)]) -> Typed {
-    let value = |name: &str, text: &str| match schema.iter().find(|p| p.name == name) {
-        Some(param) => typed(param, text),
-        None => text.into(),
-    };
-    params.iter().map(|(name, text)| (*name, value(name, text))).collect()
 }
 
 /// All of a run; `tiles` holds each tile's place and report.

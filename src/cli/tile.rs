@@ -1,20 +1,19 @@
 //! `texforge tile`.
 
-use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use clap::ArgMatches;
 
 use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
-use crate::cli::maps::{self, Wanted};
+use crate::cli::maps::{Asked, Map};
 use crate::cli::output::{Target, to_stdout};
 use crate::cli::small::print_json;
 use crate::cli::sources::Sources;
 use crate::cli::summary::{self, Summary, Written};
 use crate::cli::work::{Session, supervise};
 use crate::cli::{args, files};
-use crate::image::material::{MapKind, Sibling};
+use crate::image::material::{MapKind, output_path};
 use crate::image::picture::Picture;
 use crate::image::rect::Rect;
 use crate::image::sheet;
@@ -35,8 +34,7 @@ struct Request {
     params: TileParams,
     /// The rectangle to make anew, and the tile's source map.
     redo: Option<(Rect, PathBuf)>,
-    maps: Vec<Wanted>,
-    pick_up: bool,
+    maps: Asked,
     force: bool,
 }
 
@@ -51,7 +49,7 @@ struct Place {
 impl Place {
     /// The file of a map of the tile.
     fn map(&self, name: &str, map: &Picture) -> PathBuf {
-        maps::output_path(self.tile.file().unwrap_or(Path::new("tile.png")), name, map)
+        output_path(self.tile.file().unwrap_or(Path::new("tile.png")), name, map)
     }
 }
 
@@ -73,8 +71,7 @@ impl Request {
         let params = TileParams::from_texts(args::text(matches))?;
         let target = Target::typed(&path("output").unwrap_or_default())?;
         let sources = Sources::typed(matches);
-        let maps = matches.get_many::<OsString>("map").into_iter().flatten();
-        let maps = maps::typed(maps, sources.photos.len())?;
+        let mut maps = Asked::from(matches, sources.photos.len())?;
         let source_map = path("save-source-map");
         let rect = matches.get_one::<String>("redo").map(|text| {
             let expected = "a rectangle as WIDTHxHEIGHT+X+Y";
@@ -90,21 +87,20 @@ impl Request {
         if target == Target::Stdout && count > 1 {
             return Err(needs_file("variants"));
         }
-        if target == Target::Stdout && !maps.is_empty() {
+        if target == Target::Stdout && !maps.typed.is_empty() {
             return Err(needs_file("map"));
         }
         if target == Target::Stdout && wants("json") {
             return Err(needs_file("json"));
         }
-        if params.method == Method::MakeSeamless && (source_map.is_some() || !maps.is_empty()) {
+        if params.method == Method::MakeSeamless && (source_map.is_some() || !maps.typed.is_empty())
+        {
             let expected = "one that copies pixels, when maps or a source map are wanted";
             return Err(Error::parameter("method", expected, "`make-seamless`, which blends"));
         }
+        maps.pick_up &= target != Target::Stdout && params.method != Method::MakeSeamless;
         Ok(Self {
             sources,
-            pick_up: !wants("no-maps")
-                && target != Target::Stdout
-                && params.method != Method::MakeSeamless,
             places: places(&target, source_map.as_deref(), wants("preview"), count),
             params,
             redo: rect.zip(path("redo-of")),
@@ -113,33 +109,25 @@ impl Request {
         })
     }
 
+    /// The files that are read besides those of the maps.
     fn inputs(&self) -> Vec<&Path> {
-        let maps = self.maps.iter().flat_map(|m| &m.paths);
-        let of = self.redo.as_ref().map(|(_, map)| map);
-        maps.chain(of).map(PathBuf::as_path).chain(self.sources.paths()).collect()
+        let of = self.redo.as_ref().map(|(_, map)| map.as_path());
+        of.into_iter().chain(self.sources.paths()).collect()
     }
 
     /// Fails if an output cannot be written, or two outputs are the same file.
-    fn check_outputs(&self, maps: &[Input]) -> Result<()> {
+    fn check_outputs(&self, maps: &[Map]) -> Result<()> {
         let mut inputs = self.inputs();
+        inputs.extend(self.maps.paths());
         inputs.extend(maps.iter().flat_map(|m| &m.wanted.paths).map(PathBuf::as_path));
-        let mut seen: Vec<PathBuf> = Vec::new();
-        for place in &self.places {
+        let outputs = self.places.iter().flat_map(|place| {
             let tile = place.tile.file().map(|p| ("output", p.to_owned()));
             let source_map = place.source_map.clone().map(|p| ("save-source-map", p));
             let preview = place.preview.clone().map(|p| ("preview", p));
             let maps = maps.iter().map(|m| ("map", place.map(m.wanted.name, &m.pictures[0])));
-            for (flag, path) in tile.into_iter().chain(source_map).chain(preview).chain(maps) {
-                files::check_place(&path, &inputs, self.force)?;
-                let absolute = std::path::absolute(&path).map_err(Error::io("write", &path))?;
-                if seen.contains(&absolute) {
-                    let got = format!("{} twice", path.display());
-                    return Err(Error::parameter(flag, "a file of its own for each output", got));
-                }
-                seen.push(absolute);
-            }
-        }
-        Ok(())
+            tile.into_iter().chain(source_map).chain(preview).chain(maps)
+        });
+        files::check_outputs(outputs, &inputs, self.force)
     }
 }
 
@@ -162,12 +150,6 @@ fn needs_file(flag: &'static str) -> Error {
     Error::parameter(flag, "left out when the tile goes to standard output", "`-o -`")
 }
 
-/// A map that was read, of each photo.
-struct Input {
-    wanted: Wanted,
-    pictures: Vec<Picture>,
-}
-
 /// Everything between the checked command line and the renamed files.
 fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Vec<String>)> {
     // Look at the places before anything is read: the cheapest refusal first.
@@ -181,7 +163,11 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Vec
     };
     let redo = redone.as_ref().map(|(rect, of)| Redo { of, rect: *rect });
     let (photo, inputs) = (&pictures.photo, Inputs { redo, ..pictures.inputs() });
-    let maps = read_maps(session, request, &inputs, &mut notes)?;
+    let places = |name: &str, map: &Picture| -> Vec<PathBuf> {
+        request.places.iter().map(|place| place.map(name, map)).collect()
+    };
+    let made_of = (&request.sources.photos[..], &inputs, &request.params);
+    let maps = request.maps.read(session, made_of, &request.inputs(), places, &mut notes)?;
     request.check_outputs(&maps)?;
     files::ensure_can_hold(photo, request.places[0].tile.file(), MapKind::Color)?;
     session.check()?;
@@ -198,7 +184,7 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Vec
         let mut stage =
             |role, name: Option<&str>, path: &Path, bytes: Vec<u8>, picture: &Picture| {
                 session.check()?;
-                session.staging.stage(session, path, &bytes)?;
+                session.staging.stage(path, &bytes)?;
                 let (width, height) = (picture.width(), picture.height());
                 written.push(Written::new(role, name, path, width, height));
                 Ok(())
@@ -211,7 +197,7 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Vec
             None => piped = Some(bytes),
         }
         if let Some(source_map) = &source_map {
-            for Input { wanted, pictures } in &maps {
+            for Map { wanted, pictures } in &maps {
                 let maps: Vec<&Picture> = pictures.iter().collect();
                 let map = source_map.apply_all(&maps, wanted.kind)?;
                 let to = place.map(wanted.name, &map);
@@ -232,7 +218,7 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Vec
     }
 
     // All is computed: now the files get their names, all or none.
-    session.staging.commit(session, request.force)?;
+    session.staging.commit(request.force)?;
     if let Some(bytes) = piped {
         to_stdout(&bytes)?;
     }
@@ -247,93 +233,4 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Vec
     let line = |(target, report): &_| summary::line(&request.params, target, report, elapsed);
     let lines = done.iter().map(line).collect();
     Ok((summary::summary(ctx, &request.sources.photos, &done, notes, written, elapsed), lines))
-}
-
-/// Reads the maps that were typed and those that lie beside the photos. Of the latter, those that
-/// do not fit are left out with a note: nobody asked for them.
-fn read_maps(
-    session: &Session,
-    request: &Request,
-    inputs: &Inputs<'_>,
-    notes: &mut Vec<String>,
-) -> Result<Vec<Input>> {
-    let mut wanted = request.maps.clone();
-    if request.pick_up {
-        wanted.extend(beside(request, notes)?);
-    }
-    let mut maps = Vec::new();
-    for wanted in wanted {
-        let read = || {
-            let mut pictures = Vec::new();
-            for path in &wanted.paths {
-                session.check()?;
-                let map = files::read(path, wanted.kind)?;
-                map.ensure_finite(&format!("the map `{}`", wanted.name))?;
-                pictures.push(map);
-            }
-            let all: Vec<&Picture> = pictures.iter().collect();
-            let name = format!("{} ({})", wanted.name, wanted.paths[0].display());
-            inputs.ensure_maps_fit(&name, &all, wanted.kind, &request.params)?;
-            Ok(pictures)
-        };
-        let shown = wanted.paths[0].display().to_string();
-        match read() {
-            Ok(pictures) => {
-                let own = |place: &Place| {
-                    let to = place.map(wanted.name, &pictures[0]);
-                    wanted.paths.iter().any(|path| same_place(&to, path))
-                };
-                if wanted.found && request.places.iter().any(own) {
-                    // What an earlier run made of a map is no map of the photo.
-                    notes.push(format!("{shown} was left alone: it is where this tile's map goes"));
-                    continue;
-                }
-                if wanted.found {
-                    let name = &wanted.name;
-                    session.console.say(&format!(
-                        "{shown}: taken as the photo's {name} map (--no-maps leaves it alone)"
-                    ));
-                }
-                maps.push(Input { wanted, pictures });
-            }
-            Err(error @ Error::Cancelled) => return Err(error),
-            Err(error) if wanted.found => notes.push(format!("{shown} was left alone: {error}")),
-            Err(error) => return Err(error),
-        }
-    }
-    Ok(maps)
-}
-
-/// The maps that lie beside the photos and were not typed: those that every photo has.
-fn beside(request: &Request, notes: &mut Vec<String>) -> Result<Vec<Wanted>> {
-    let taken: Vec<_> = request.inputs().into_iter().map(Path::to_owned).collect();
-    let mut found: Vec<Vec<Sibling>> = Vec::new();
-    for photo in &request.sources.photos {
-        let mut siblings = files::siblings(photo)?;
-        siblings.retain(|s| {
-            let typed = request.maps.iter().any(|m| m.name == s.name);
-            !typed && !taken.iter().any(|taken| same_place(taken, &s.path))
-        });
-        found.push(siblings);
-    }
-    // Shown as the photo was typed.
-    let shown = |path: &Path| path.strip_prefix(".").unwrap_or(path).to_owned();
-    let mut wanted = Vec::new();
-    for Sibling { name, kind, path } in &found[0] {
-        let of_photo =
-            |all: &Vec<Sibling>| all.iter().find(|s| s.name == *name).map(|s| shown(&s.path));
-        match found.iter().map(of_photo).collect() {
-            Some(paths) => wanted.push(Wanted { name, paths, kind: *kind, found: true }),
-            None => notes.push(format!(
-                "{} was left alone: not every photo has a {name} map",
-                shown(path).display()
-            )),
-        }
-    }
-    Ok(wanted)
-}
-
-/// Whether two paths name the same file, as far as both exist.
-fn same_place(a: &Path, b: &Path) -> bool {
-    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }

@@ -10,8 +10,8 @@ use clap::ArgMatches;
 
 use crate::base::ctx::{Ctx, Job};
 use crate::base::error::{Error, Result};
-use crate::cli::output::Staging;
 use crate::cli::show::Console;
+use crate::image::io::Staging;
 
 /// How often the watching thread looks up.
 const POLL: Duration = Duration::from_millis(20);
@@ -52,7 +52,8 @@ pub(super) struct Session {
 impl Session {
     /// A session around the job of a run.
     pub(super) fn new(job: Arc<Job>, quiet: bool) -> Arc<Self> {
-        Arc::new(Self { job, console: Console::new(quiet), staging: Staging::default() })
+        let staging = Staging::new(Arc::clone(&job));
+        Arc::new(Self { job, console: Console::new(quiet), staging })
     }
 
     /// Begins a run as typed: `--seed` (0 for a command without), `--threads` and `--quiet`.

@@ -1,10 +1,12 @@
 //! Maps of a material: what each is, and by which names it goes.
 
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 use crate::base::error::{Error, Result};
 use crate::base::params::choice;
 use crate::image::io::files_beside;
+use crate::image::picture::Picture;
 
 choice! {
     /// What a map's numbers are.
@@ -91,6 +93,13 @@ impl MapName {
         ]
     };
 
+    /// The map that goes by this name or alias, in any spelling (`normal`, `Normal-GL`).
+    pub(crate) fn named(name: &str) -> Option<Self> {
+        let plain: String = name.chars().filter(|c| !is_separator(*c)).collect();
+        let plain = plain.to_lowercase();
+        Self::of_alias(&plain)
+    }
+
     fn of_alias(alias: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|map| map.aliases.contains(&alias))
     }
@@ -129,6 +138,37 @@ fn parts(file_name: &str) -> Option<Parts> {
         let map = MapName::of_alias(&words[end - n..end].concat())?;
         Some(Parts { prefix: words[..end - n].join("_"), map, suffix: words[end..].join("_") })
     })
+}
+
+/// The stem of a tile's name without the ending that calls it a base color, if it has one:
+/// `brick_base_color` becomes `brick`, `basecolor` nothing.
+pub(crate) fn without_color_ending(stem: &str) -> &str {
+    let is_color = |word: &str| MapName::named(word).is_some_and(|map| map.name == BASE);
+    if is_color(stem) {
+        return "";
+    }
+    let mut cuts = stem.char_indices().filter(|(_, c)| is_separator(*c));
+    cuts.find(|(at, _)| is_color(&stem[at + 1..])).map_or(stem, |(at, _)| &stem[..at])
+}
+
+/// Whether a file can be named after a map of this name.
+pub(crate) fn is_plain(name: &str) -> bool {
+    let plain = |c: char| c.is_alphanumeric() || matches!(c, '_' | '-');
+    (1..=64).contains(&name.len()) && name.chars().all(plain)
+}
+
+/// Where a map of `tile` goes: `brick.png` and `normal` make `brick_normal.png`, and so does
+/// `brick_basecolor.png`. Integers become PNG, floats EXR, as both keep every bit.
+pub(crate) fn output_path(tile: &Path, name: &str, map: &Picture) -> PathBuf {
+    let extension = if map.samples().is_float() { "exr" } else { "png" };
+    let stem = tile.file_stem().unwrap_or_default();
+    let stem = stem.to_str().map_or(stem, |s| OsStr::new(without_color_ending(s)));
+    let mut file = stem.to_owned();
+    if !file.is_empty() {
+        file.push("_");
+    }
+    file.push(format!("{name}.{extension}"));
+    tile.with_file_name(file)
 }
 
 /// A map found beside a photo.
@@ -194,6 +234,7 @@ pub fn siblings(photo: &Path) -> Result<Vec<Sibling>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::image::picture::{Encoding, Samples};
 
     #[test]
     fn names_are_classified_by_their_last_words() {
@@ -305,5 +346,36 @@ mod tests {
         assert_eq!(found(&files, "photo.jpg"), pairs(&[("normal", "photo_normal.png")]));
         assert_eq!(found(&["rusty_metal.jpg", "rusty_rough.jpg"], "rusty_metal.jpg"), []);
         assert_eq!(found(&["a.jpg", "b_normal.jpg"], "a.jpg"), []);
+    }
+
+    #[test]
+    fn the_color_ending_is_found() {
+        let cases = [
+            ("brick", "brick"),
+            ("brick_base_color", "brick"),
+            ("old brick-Albedo", "old brick"),
+            ("watercolor", "watercolor"),
+            ("basecolor", ""),
+        ];
+        for (stem, want) in cases {
+            assert_eq!(without_color_ending(stem), want, "{stem}");
+        }
+    }
+
+    #[test]
+    fn names_go_by_their_aliases() {
+        assert_eq!(MapName::named("Normal-GL").map(|m| m.name), Some("normal_gl"));
+        assert_eq!(MapName::named("my_normal"), None);
+    }
+
+    #[test]
+    fn outputs_are_named_after_the_tile() {
+        let of = |samples| Picture::new(1, 1, 1, samples, Encoding::Data).expect("picture");
+        let (int, float) = (of(Samples::U16(vec![7])), of(Samples::F32(vec![0.5])));
+        let name = |tile: &str, map| output_path(Path::new(tile), "normal", map);
+        assert_eq!(name("x/brick.png", &int), Path::new("x/brick_normal.png"));
+        assert_eq!(name("x/brick.tif", &float), Path::new("x/brick_normal.exr"));
+        assert_eq!(name("brick_basecolor.png", &int), Path::new("brick_normal.png"));
+        assert_eq!(name("basecolor.png", &int), Path::new("normal.png"));
     }
 }

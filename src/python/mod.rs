@@ -309,20 +309,20 @@ fn read<'py>(py: Python<'py>, path: PathBuf, kind: &str) -> PyResult<ArrayOut<'p
     array_out(py, &picture)
 }
 
-/// Writes a picture.
+/// Writes pictures (path, picture, what its numbers are, how it was made): all of them or none.
 #[pyfunction]
-#[pyo3(signature = (*, path, picture, kind, record, overwrite))]
+#[pyo3(signature = (*, files, overwrite))]
 fn write<'py>(
     py: Python<'py>,
-    path: PathBuf,
-    picture: ArrayIn<'py>,
-    kind: &str,
-    record: Option<String>,
+    files: Vec<(PathBuf, ArrayIn<'py>, String, Option<String>)>,
     overwrite: bool,
 ) -> PyResult<()> {
-    let options = WriteOptions { kind: kind_named(kind).into_py(py)?, record, force: overwrite };
-    let picture = picture.picture(py)?;
-    enter::unheard(py, move || io::write(&path, &picture, &options))
+    let picture = |(path, picture, kind, record): (PathBuf, ArrayIn<'py>, String, _)| {
+        let kind = kind_named(&kind).into_py(py)?;
+        Ok((path, picture.picture(py)?, WriteOptions { kind, record, force: overwrite }))
+    };
+    let pictures = files.into_iter().map(picture).collect::<PyResult<Vec<_>>>()?;
+    enter::unheard(py, move || io::write_all(&pictures, overwrite))
 }
 
 /// The bytes of a PNG file of the picture.
@@ -438,7 +438,7 @@ mod _texforge {
     #[pymodule_export]
     use super::noise::{Noise, export_targets, fit_noise, write_files};
     #[pymodule_export]
-    use super::regular::regular;
+    use super::regular::{regular, regular_to_file};
     #[pymodule_export]
     use super::{
         apply, cli_main, cli_study, encode_png, error_kinds, fail, lattice, lattice_overlay,

@@ -449,6 +449,52 @@ mod program {
     }
 
     #[test]
+    fn maps_beside_the_photo_come_along() {
+        let folder = folder();
+        folder.grey16("cloth_height.png", 120, 96, 3);
+        folder.grey16("cloth_ao.png", 120, 40, 3);
+        let args = ["extract", "cloth.png", "--count", "2", "--period", "24x16"];
+        let to = |more: &[&'static str]| [&args[..], more].concat();
+        folder.does(&to(&["-o", "typed", "--map", "height=cloth_height.png", "--no-maps"]));
+        let said = folder.does(&to(&["-o", "found"]));
+        assert!(said.contains("cloth_height.png: taken as the photo's height map"), "{said}");
+        assert!(said.contains("note: cloth_ao.png was left alone: the map"), "{said}");
+        assert_eq!(names(&folder, "found"), names(&folder, "typed"));
+        let bytes = |name: &str| std::fs::read(folder.at(name)).expect("a file");
+        for name in ["tile_01_height.png", "tile_02_height.png"] {
+            assert!(bytes(&format!("found/{name}")) == bytes(&format!("typed/{name}")), "{name}");
+        }
+        let said = folder.does(&to(&["-o", "bare", "--no-maps"]));
+        assert!(!said.contains("cloth_height.png"), "{said}");
+        assert!(!folder.at("bare/tile_01_height.png").exists());
+        // What would be overwritten is found before the work.
+        std::fs::rename(
+            folder.at("found/tile_02_height.png"),
+            folder.at("bare/tile_02_height.png"),
+        )
+        .expect("moved");
+        for name in ["sheet.png", "tile_01.png", "tile_02.png", "tiling_01.png", "tiling_02.png"] {
+            std::fs::remove_file(folder.at(format!("bare/{name}"))).expect("removed");
+        }
+        let args = ["extract", "cloth.png", "-o", "bare", "--period", "70x16"];
+        folder.refuses(&args, 1, "tile_02_height.png exists already");
+    }
+
+    #[test]
+    fn a_map_of_the_photo_is_not_where_a_tiles_goes() {
+        let folder = folder();
+        std::fs::rename(folder.at("cloth.png"), folder.at("tile_02_color.png")).expect("moved");
+        folder.grey16("tile_02_height.png", 120, 96, 3);
+        let args = ["extract", "tile_02_color.png", "-o", ".", "--period", "24x16", "--force"];
+        let before = std::fs::read(folder.at("tile_02_height.png")).expect("a map");
+        let said = folder.does(&args);
+        let own = "tile_02_height.png was left alone: it is where this run's map goes";
+        assert!(said.contains(own), "{said}");
+        assert!(std::fs::read(folder.at("tile_02_height.png")).expect("a map") == before);
+        assert!(!folder.at("tile_01_height.png").exists());
+    }
+
+    #[test]
     fn nothing_is_overwritten_and_nothing_is_left_behind() {
         let folder = folder();
         let args = ["extract", "cloth.png", "-o", "out", "--count", "1"];

@@ -441,6 +441,57 @@ mod program {
     }
 
     #[test]
+    fn maps_beside_the_photo_come_along() {
+        let folder = folder();
+        folder.grey16("wall_height.png", 160, 144, 1);
+        folder.grey16("wall_ao.png", 160, 40, 1);
+        let args = ["wall.png", "--lattice", LATTICE, "--size", "96x80", "--block", "16"];
+        let made = |more: &[&str]| {
+            let output = run(&folder, &[&args[..], more].concat());
+            let said = String::from_utf8_lossy(&output.stderr).into_owned();
+            assert!(output.status.success(), "{more:?}: {said}");
+            (output.stdout, said)
+        };
+        let bytes = |name: &str| std::fs::read(folder.at(name)).expect("a file");
+
+        // As they were typed, in rows as well as at once.
+        made(&["-o", "typed.png", "--map", "height=wall_height.png", "--no-maps"]);
+        let (stdout, said) = made(&["-o", "rows.png", "--json"]);
+        assert!(said.contains("wall_height.png: taken as the photo's height map"), "{said}");
+        assert!(said.contains("note: wall_ao.png was left alone: the map"), "{said}");
+        assert!(said.contains("rows_height.png  96x80 (height map)"), "{said}");
+        made(&["-o", "whole.png", "--save-source-map", "source.exr"]);
+        for name in ["rows_height.png", "whole_height.png"] {
+            assert!(bytes(name) == bytes("typed_height.png"), "{name}");
+        }
+        let json: serde_json::Value = serde_json::from_slice(&stdout).expect("JSON");
+        let files = json["files"].as_array().expect("a list");
+        let names = files.iter().map(|f| [&f["role"], &f["path"]].map(|v| v.as_str().expect("it")));
+        let want = [["texture", "rows.png"], ["map", "rows_height.png"]];
+        assert_eq!(names.collect::<Vec<_>>(), want);
+        assert!(json["notes"][0].as_str().is_some_and(|n| n.contains("wall_ao.png")), "{json}");
+
+        // Left alone when asked to, and where there is no place for them.
+        let before = folder.names();
+        let (_, said) = made(&["-o", "bare.png", "--no-maps"]);
+        assert!(!said.contains("wall_height.png"), "{said}");
+        made(&["-o", "-"]);
+        assert_eq!(folder.names().len(), before.len() + 1, "bare.png alone");
+        // The texture's height map would be the photo's.
+        let (_, said) = made(&["-o", "wall_color.png"]);
+        let own = "wall_height.png was left alone: it is where this run's map goes";
+        assert!(said.contains(own), "{said}");
+
+        // What would be overwritten is found before the work.
+        std::fs::remove_file(folder.at("rows.png")).expect("removed");
+        let args = ["wall.png", "--lattice", LATTICE, "--block", "999", "-o", "rows.png"];
+        let output = run(&folder, &args);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(said.contains("rows_height.png exists already"), "{said}");
+        assert!(!folder.at("rows.png").exists());
+    }
+
+    #[test]
     fn bad_input_leaves_nothing_behind() {
         let folder = folder();
         folder.rgb_from("grey.png", 96, 96, |_, _| [90, 90, 90]);

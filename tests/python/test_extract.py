@@ -143,6 +143,54 @@ def test_files_are_those_of_the_command_line(tmp_path: Path) -> None:
     found.save(tmp_path / "out", overwrite=True)
 
 
+def contents(folder: Path) -> dict[str, bytes | None]:
+    """Return the bytes of every file; None for a folder."""
+    return {p.name: None if p.is_dir() else p.read_bytes() for p in folder.iterdir()}
+
+
+def test_all_files_are_saved_or_none(tmp_path: Path) -> None:
+    photo = cloth()
+    found = texforge.extract(photo, count=2, maps={"height": photo[..., 0]})
+    # A file that is there is the last but two.
+    folder = tmp_path / "out"
+    folder.mkdir()
+    (folder / "tile_02_height.png").write_bytes(b"old")
+    with pytest.raises(texforge.OutputExistsError, match="tile_02_height"):
+        found.save(folder)
+    assert contents(folder) == {"tile_02_height.png": b"old"}
+    # A place that cannot be written to.
+    (folder / "tiling_02.png").mkdir()
+    with pytest.raises(texforge.FileError, match="tiling_02"):
+        found.save(folder, overwrite=True)
+    assert contents(folder) == {"tile_02_height.png": b"old", "tiling_02.png": None}
+    # A picture that the format cannot hold, found while the files are written.
+    (folder / "tiling_02.png").rmdir()
+    wide = np.zeros((*photo.shape[:2], 5), np.uint8)
+    odd = texforge.extract(photo, count=2, maps={"height": wide})
+    with pytest.raises(texforge.FormatError, match="tile_01_height"):
+        odd.save(folder, overwrite=True)
+    assert contents(folder) == {"tile_02_height.png": b"old"}
+    # A folder that was made for nothing goes away.
+    with pytest.raises(texforge.FormatError):
+        odd.save(tmp_path / "new")
+    assert not (tmp_path / "new").exists()
+    assert len(found.save(folder, overwrite=True)) == len(contents(folder)) == 7
+    assert texforge.read_image(folder / "tile_02_height.png").shape == (20, 28)
+
+
+def test_folders_that_cannot_be_made(tmp_path: Path) -> None:
+    found = texforge.extract(cloth(), count=1)
+    (tmp_path / "file").write_bytes(b"old")
+    for name, kind in {
+        "file": texforge.OutputExistsError,
+        "file/out": texforge.FileError,
+        "no/out": texforge.MissingFileError,
+    }.items():
+        with pytest.raises(kind, match=name):
+            found.save(tmp_path / name)
+    assert contents(tmp_path) == {"file": b"old"}
+
+
 BAD: dict[str, dict[str, Any]] = {
     "a period of one number": {"period": 20},
     "a period of three": {"period": (1, 2, 3)},

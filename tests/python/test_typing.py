@@ -40,7 +40,7 @@ def test_a_tile_from_everything(tmp_path: Path) -> None:
     assert_type(texforge.apply(loaded, photo), npt.NDArray[Any])
 
 
-def test_a_near_regular_texture() -> None:
+def test_a_near_regular_texture(tmp_path: Path) -> None:
     y, x = np.mgrid[:64, :80]
     photo = np.where((y % 16 < 3) | (x % 20 < 3), 200, 90).astype(np.uint8)
     found = texforge.detect_lattice(photo)
@@ -51,6 +51,9 @@ def test_a_near_regular_texture() -> None:
         assert_type(texture.apply(photo), npt.NDArray[Any])
         assert_type(texforge.apply(texture, photo), npt.NDArray[Any])
     texforge.regular(photo, lattice="none", seam="cut", maps={"height": photo}, straighten="off")
+    file = texforge.regular_to_file(photo, tmp_path / "a.png", lattice="none", size=(32, 40))
+    assert_type(file, texforge.RegularFile)
+    assert_type(file.maps, dict[str, Path])
 
 
 def test_a_procedural_texture(tmp_path: Path) -> None:
@@ -83,6 +86,7 @@ def test_wrong_words_are_type_errors(photo: npt.NDArray[np.uint8]) -> None:
         lambda: texforge.tile(photo, quality="fast"),  # type: ignore[arg-type]
         lambda: texforge.tile(photo, size="64"),  # type: ignore[arg-type]
         lambda: texforge.tile(photo, progress=3),  # type: ignore[arg-type]
+        lambda: texforge.regular_to_file(photo, "a.png", seam="glue"),  # type: ignore[arg-type]
         lambda: texforge.fit_noise(photo, bands="hexagonal"),  # type: ignore[arg-type]
         lambda: texforge.fit_noise(photo).render(8, dtype="int8"),  # type: ignore[arg-type]
     )
@@ -91,4 +95,4 @@ def test_wrong_words_are_type_errors(photo: npt.NDArray[np.uint8]) -> None:
             call()
         except texforge.ParameterError as error:
             wrong.append(error)
-    assert len(wrong) == 6
+    assert len(wrong) == 7

@@ -130,9 +130,9 @@ fn work(session: &Session, request: &Request) -> Result<serde_json::Value> {
     let inputs = [request.document.as_path()];
     files.iter().try_for_each(|(_, path, _)| check_place(path, &inputs, request.force))?;
     for (_, path, bytes) in &files {
-        session.staging.stage(session, path, bytes)?;
+        session.staging.stage(path, bytes)?;
     }
-    session.staging.commit(session, request.force)?;
+    session.staging.commit(request.force)?;
     let written = |(target, path, bytes): &(Target, PathBuf, Vec<u8>)| {
         session.console.say(&format!(
             "{}  {} bytes ({})",

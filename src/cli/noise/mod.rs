@@ -89,9 +89,9 @@ fn read(path: &Path) -> Result<NoiseTexture> {
 fn write(session: &Session, target: &Target, texture: &NoiseTexture, force: bool) -> Result<()> {
     let text = texture.to_json() + "\n";
     if let Some(path) = target.file() {
-        session.staging.stage(session, path, text.as_bytes())?;
+        session.staging.stage(path, text.as_bytes())?;
     }
-    session.staging.commit(session, force)?;
+    session.staging.commit(force)?;
     match target {
         Target::Stdout => to_stdout(text.as_bytes()),
         Target::File(_) => Ok(()),

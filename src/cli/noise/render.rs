@@ -10,15 +10,15 @@ use super::{document, path, read, shown, target};
 use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
 use crate::base::params::Value as _;
+use crate::base::record::{Typed, record_of};
 use crate::cli::output::{Target, to_stdout};
 use crate::cli::show::duration;
 use crate::cli::small::{SCHEMA_VERSION, print_json};
-use crate::cli::strips::{self, STRIP_PIXELS};
-use crate::cli::summary::{Typed, Written, record_of};
+use crate::cli::summary::Written;
 use crate::cli::work::{Session, supervise};
-use crate::cli::{args, files, maps};
-use crate::image::io::{Format, WriteOptions};
-use crate::image::material::MapKind;
+use crate::cli::{args, files};
+use crate::image::io::{Format, STRIP_PIXELS, WriteOptions, write_strips};
+use crate::image::material::{MapKind, is_plain, output_path};
 use crate::verb::noise::{NoiseTexture, RenderParams, SampleType};
 use crate::verb::params::Size;
 
@@ -165,17 +165,17 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<serde_json::V
             .collect();
         let strips = texture.strips(ctx, &params, STRIP_PIXELS)?;
         let pictures = strips.map(|strip| Ok(strip?.into_iter().map(|(_, _, p)| p).collect()));
-        strips::write(session, &files, size.1, pictures)?;
+        write_strips(&session.staging, &files, size.1, pictures)?;
     } else {
         let maps = texture.render(ctx, &params)?;
         for (i, ((path, kind), (_, _, picture))) in outputs.iter().zip(&maps).enumerate() {
             session.check()?;
             let record = options(i, *kind).record;
             let bytes = files::encode(picture, Some(path), *kind, record.as_deref())?;
-            session.staging.stage(session, path, &bytes)?;
+            session.staging.stage(path, &bytes)?;
         }
     }
-    session.staging.commit(session, request.force)?;
+    session.staging.commit(request.force)?;
     if let Some(bytes) = piped {
         to_stdout(&bytes)?;
     }
@@ -218,14 +218,13 @@ fn places(texture: &NoiseTexture, ctx: &Ctx, request: &Request) -> Result<Vec<(P
     let pixels = texture.render(ctx, &request.params)?;
     let mut places: Vec<(PathBuf, MapKind)> = Vec::new();
     for (i, (name, kind, pixel)) in pixels.iter().enumerate() {
-        let plain = |c: char| c.is_alphanumeric() || matches!(c, '_' | '-');
-        if name.is_empty() || name.len() > 64 || !name.chars().all(plain) {
+        if !is_plain(name) {
             return Err(Error::Decode {
                 path: request.document.clone(),
                 reason: format!("a file cannot be named after its map `{name}`; call it otherwise"),
             });
         }
-        let path = if i == 0 { first.to_owned() } else { maps::output_path(first, name, pixel) };
+        let path = if i == 0 { first.to_owned() } else { output_path(first, name, pixel) };
         if places.iter().any(|(other, _)| *other == path) {
             let got = format!("{} twice", path.display());
             return Err(Error::parameter("output", "a file of its own for each map", got));

@@ -79,9 +79,9 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<serde_json::V
     let sheet = texture.sheet(ctx, photo.as_ref())?;
     let bytes = files::encode(&sheet, place, MapKind::Color, None)?;
     if let Some(path) = place {
-        session.staging.stage(session, path, &bytes)?;
+        session.staging.stage(path, &bytes)?;
     }
-    session.staging.commit(session, request.force)?;
+    session.staging.commit(request.force)?;
     if place.is_none() {
         to_stdout(&bytes)?;
     }

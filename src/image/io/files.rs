@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use super::load;
-use super::place::{check_place, put};
+use super::place::check_place;
+use super::staging::Staging;
 use crate::base::error::{Error, Result};
 
 /// Reads a file of text (UTF-8).
@@ -17,13 +18,15 @@ pub fn read_text(path: &Path) -> Result<String> {
     })
 }
 
-/// Writes files, each whole or not at all. All places are checked before the first is written.
+/// Writes files: all of them, each whole, or none.
 ///
 /// # Errors
 /// [`Error::Exists`] (unless `force`), [`Error::Io`].
 pub fn write_files(files: &[(PathBuf, Vec<u8>)], force: bool) -> Result<()> {
     files.iter().try_for_each(|(path, _)| check_place(path, &[], force))?;
-    files.iter().try_for_each(|(path, bytes)| put(path, bytes, force))
+    let staging = Staging::default();
+    files.iter().try_for_each(|(path, bytes)| staging.stage(path, bytes))?;
+    staging.commit(force)
 }
 
 #[cfg(test)]

@@ -16,6 +16,8 @@ mod png;
 mod record;
 mod rows;
 mod source_map;
+mod staging;
+mod strips;
 mod tiff;
 mod write;
 
@@ -28,11 +30,15 @@ use crate::image::material::MapKind;
 use crate::image::picture::{Encoding, Meta, Picture, Samples};
 
 pub use files::{read_text, write_files};
+pub(crate) use place::check_outputs;
 pub use place::{check_output, check_place};
 pub use record::read_record;
 pub use rows::write_rows;
 pub use source_map::{encode_source_map, read_source_map, write_source_map};
-pub use write::{WriteOptions, encode, write};
+pub(crate) use staging::Staging;
+pub(crate) use strips::{STRIP_PIXELS, write_strips};
+pub(crate) use write::ensure_can_hold;
+pub use write::{WriteOptions, encode, write, write_all};
 
 /// A file format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 //! Where files go: checked before the work, put there whole after it.
 
 use std::fs;
-use std::io::{ErrorKind, Write};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use super::Format;
@@ -60,40 +60,31 @@ pub fn check_place(path: &Path, inputs: &[&Path], force: bool) -> Result<()> {
         .map_err(|source| io(path, source))
 }
 
-/// Writes `bytes` to `path` so that the file is there whole or not at all.
+/// Fails if one of these outputs, each with the flag that asks for it, cannot be written, or two are
+/// the same file.
 ///
-/// With `force` an existing file is replaced (a symbolic link's target, not the link) and its
-/// permissions are kept; a new file gets the permissions that any new file gets.
-pub(super) fn put(path: &Path, bytes: &[u8], force: bool) -> Result<()> {
-    let io = |source| Error::Io { action: "write", path: path.to_owned(), source };
-    let target = if force { resolved(path) } else { path.to_owned() };
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".texforge-");
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        // Subject to the umask, as for any new file.
-        builder.permissions(fs::Permissions::from_mode(0o666));
-    }
-    let mut file = builder.tempfile_in(folder_of(&target)).map_err(io)?;
-    file.write_all(bytes).map_err(io)?;
-    if force && let Ok(old) = fs::metadata(&target) {
-        file.as_file().set_permissions(old.permissions()).map_err(io)?;
-    }
-    file.as_file().sync_all().map_err(io)?;
-    if force {
-        file.persist(&target).map_err(|e| io(e.error))?;
-    } else {
-        file.persist_noclobber(&target).map_err(|e| match e.error.kind() {
-            ErrorKind::AlreadyExists => Error::Exists { path: path.to_owned() },
-            _ => io(e.error),
-        })?;
+/// # Errors
+/// Those of [`check_output`], [`Error::Parameter`].
+pub(crate) fn check_outputs(
+    outputs: impl Iterator<Item = (&'static str, PathBuf)>,
+    inputs: &[&Path],
+    force: bool,
+) -> Result<()> {
+    let mut seen: Vec<PathBuf> = Vec::new();
+    for (name, path) in outputs {
+        check_output(&path, inputs, force)?;
+        let absolute = std::path::absolute(&path).map_err(Error::io("write", &path))?;
+        if seen.contains(&absolute) {
+            let got = format!("{} twice", path.display());
+            return Err(Error::parameter(name, "a file of its own for each output", got));
+        }
+        seen.push(absolute);
     }
     Ok(())
 }
 
 /// The file that `path` names, symbolic links followed if they lead somewhere.
-fn resolved(path: &Path) -> PathBuf {
+pub(super) fn resolved(path: &Path) -> PathBuf {
     fs::canonicalize(path).unwrap_or_else(|_| path.to_owned())
 }
 
@@ -137,34 +128,6 @@ mod tests {
         {
             std::os::unix::fs::symlink(&photo, dir.path().join("soft.png")).expect("link");
             assert_eq!(kind(check("soft.png", true)), Kind::SameFile);
-        }
-    }
-
-    #[test]
-    fn puts_whole_files_with_ordinary_permissions() {
-        let dir = tempfile::tempdir().expect("folder");
-        let path = dir.path().join("a.bin");
-        put(&path, b"one", false).expect("new");
-        assert_eq!(kind(put(&path, b"two", false)), Kind::Exists);
-        assert_eq!(fs::read(&path).expect("read"), b"one");
-        put(&path, b"two", true).expect("replace");
-        assert_eq!(fs::read(&path).expect("read"), b"two");
-        assert_eq!(fs::read_dir(dir.path()).expect("list").count(), 1, "nothing left behind");
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt;
-            let mode = |p: &Path| fs::metadata(p).expect("meta").permissions().mode() & 0o777;
-            let plain = dir.path().join("plain");
-            fs::write(&plain, b"").expect("plain");
-            assert_eq!(mode(&path), mode(&plain), "as a normally created file");
-            fs::set_permissions(&path, fs::Permissions::from_mode(0o640)).expect("chmod");
-            put(&path, b"three", true).expect("replace");
-            assert_eq!(mode(&path), 0o640, "kept when replaced");
-            let link = dir.path().join("link");
-            std::os::unix::fs::symlink(&path, &link).expect("link");
-            put(&link, b"four", true).expect("through the link");
-            assert!(fs::symlink_metadata(&link).expect("meta").is_symlink(), "still a link");
-            assert_eq!(fs::read(&path).expect("read"), b"four");
         }
     }
 }

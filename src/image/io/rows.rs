@@ -105,7 +105,7 @@ fn bad(path: &Path, reason: String) -> Error {
 }
 
 /// The first pixel as a picture of its own.
-fn one_pixel(picture: &Picture) -> Result<Picture> {
+pub(super) fn one_pixel(picture: &Picture) -> Result<Picture> {
     fn first<T: Sample>(v: &[T], n: usize) -> Samples {
         T::wrap(v[..n].to_vec())
     }

@@ -7,7 +7,7 @@ use exr::image::FlatSamples;
 use exr::meta::attribute::SampleType;
 use serde::{Deserialize, Serialize};
 
-use super::place::put;
+use super::staging::put;
 use super::{Format, Source, exr as planes, guarded, load};
 use crate::base::error::{Error, Result};
 use crate::image::material::MapKind;

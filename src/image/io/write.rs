@@ -3,10 +3,11 @@
 use std::borrow::Cow;
 use std::io::Cursor;
 use std::iter::once;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use super::place::{known_extension, put};
-use super::rows::write_as;
+use super::place::{check_output, known_extension};
+use super::rows::{one_pixel, write_as};
+use super::staging::{Staging, put};
 use super::{Format, jpeg, other, unnamed};
 use crate::base::error::{Error, Result};
 use crate::image::material::MapKind;
@@ -49,12 +50,43 @@ pub fn write(path: &Path, picture: &Picture, options: &WriteOptions) -> Result<(
     put(path, &bytes, options.force)
 }
 
+/// Writes pictures as [`write`] does: all of them or none. One after the other is encoded.
+///
+/// # Errors
+/// As [`write`].
+pub fn write_all(files: &[(PathBuf, Picture, WriteOptions)], force: bool) -> Result<()> {
+    files.iter().try_for_each(|(path, ..)| check_output(path, &[], force))?;
+    let staging = Staging::default();
+    for (path, picture, options) in files {
+        staging.stage(path, &encode_for(path, picture, known_extension(path)?, options)?)?;
+    }
+    staging.commit(force)
+}
+
 /// The bytes that [`write`] would write in this format; for standard output and notebooks.
 ///
 /// # Errors
 /// [`Error::Format`].
 pub fn encode(picture: &Picture, format: Format, options: &WriteOptions) -> Result<Vec<u8>> {
     encode_for(&unnamed(), picture, format, options)
+}
+
+/// Fails if the format that `path` names (PNG without one) cannot hold pictures made of this one's
+/// pixels.
+///
+/// One pixel is tried, or all where the values decide as well as the type: floats that go where
+/// only 0 to 1 is held.
+///
+/// # Errors
+/// [`Error::Format`].
+pub(crate) fn ensure_can_hold(picture: &Picture, path: Option<&Path>, kind: MapKind) -> Result<()> {
+    let format = path.map_or(Ok(Format::Png), known_extension)?;
+    let path = path.map_or_else(unnamed, Path::to_owned);
+    let options = WriteOptions::new(kind);
+    if picture.samples().is_float() && !matches!(format, Format::Exr | Format::Tiff) {
+        return encode_for(&path, picture, format, &options).map(drop);
+    }
+    encode_for(&path, &one_pixel(picture)?, format, &options).map(drop)
 }
 
 fn encode_for(

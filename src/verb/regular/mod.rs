@@ -269,6 +269,26 @@ impl<'a> RegularMaker<'a> {
         self.divided(ctx, (pixels / (self.size().0 * self.plan.block)).max(1), 0)
     }
 
+    /// The same as pictures: of every strip the rows of the texture, then those of each of these maps of
+    /// the photo.
+    ///
+    /// # Errors
+    /// As [`strips`](Self::strips), those of [`RegularStrip::picture`].
+    pub fn pictures<'b>(
+        &'b self,
+        ctx: &Ctx,
+        pixels: usize,
+        maps: &'b [(&'b Picture, MapKind)],
+    ) -> Result<impl Iterator<Item = Result<Vec<Picture>>> + use<'a, 'b>> {
+        let strips = self.strips(ctx, pixels)?;
+        let ctx = ctx.clone();
+        Ok(strips.map(move |strip| {
+            let strip = strip?;
+            let all = [(self.photo(), MapKind::Color)].into_iter().chain(maps.iter().copied());
+            ctx.install(|| all.map(|(map, kind)| strip.picture(map, kind)).collect())
+        }))
+    }
+
     /// The same, `rows` rows of blocks at a time; `more` bytes a pixel are held besides.
     fn divided(
         &self,

@@ -3,20 +3,19 @@
 use std::path::Path;
 use std::sync::mpsc;
 
+use super::{Staging, WriteOptions, write_rows};
 use crate::base::error::{Error, Result};
-use crate::cli::work::Session;
-use crate::image::io::{WriteOptions, write_rows};
 use crate::image::picture::Picture;
 
 /// How many pixels are made at a time: some hundred megabytes.
-pub(super) const STRIP_PIXELS: usize = 1 << 23;
+pub(crate) const STRIP_PIXELS: usize = 1 << 23;
 
-/// Writes pictures of `height` rows to these files; every strip has the next rows of each, in the same order.
+/// Stages pictures of `height` rows under these files; every strip has the next rows of each, in the same order.
 ///
 /// # Errors
 /// Those of the strips, of [`write_rows`] and of the files.
-pub(super) fn write(
-    session: &Session,
+pub(crate) fn write_strips(
+    staging: &Staging,
     files: &[(&Path, WriteOptions)],
     height: usize,
     strips: impl Iterator<Item = Result<Vec<Picture>>>,
@@ -28,7 +27,7 @@ pub(super) fn write(
             let (send, rows) = mpsc::sync_channel::<Picture>(1);
             ends.push(send);
             writers.push(scope.spawn(move || {
-                session.staging.stage_with(session, path, |out| {
+                staging.stage_with(path, |out| {
                     write_rows(out, path, height, rows.into_iter().map(Ok), options)
                 })
             }));
