@@ -42,6 +42,10 @@ const EVEN: f64 = 0.11;
 /// finer scales are higher by a quarter at most.
 const GLANCE: f64 = 0.08;
 
+/// Least share of the signal in a picture's variance that noise is made up for: below, what repeats could be
+/// the file format's blocks.
+const FAINTEST: f64 = 0.2;
+
 /// A candidate lattice and how well the picture repeats by it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Candidate {
@@ -100,13 +104,15 @@ pub fn find(
             if planes.is_empty() {
                 return Ok(None);
             }
-            let field = Field::new(&Autocorrelation::new(&planes, size));
+            let gamma = Autocorrelation::new(&planes, size);
+            let field = Field::new(&gamma);
             let shortest = min_period * (scale[0] * scale[1]).sqrt();
             let found = pairs::best(&field, shortest)
                 .into_iter()
                 .map(|candidate| refine::improved(&field, candidate))
                 .reduce(|a, b| if b.goodness > a.goodness { b } else { a });
             if let Some(mut found) = found {
+                found.strength /= signal_share(&gamma).max(FAINTEST);
                 found.basis = scaled(found.basis, scale.map(f64::recip));
                 let stronger = |c: Candidate| {
                     found.strength > c.strength * if c.strength < EVEN { 1.0 } else { FINER }
@@ -132,6 +138,18 @@ pub fn find(
             correlation: found.correlation,
         }
     }))
+}
+
+/// The share of a picture's variance that is not white noise, in 0..=1: the correlation at no displacement, were it
+/// in line with those one and two pixels off. All other correlations of a picture are that much lower than
+/// those of what is in it. A line is above the parabola of a smooth picture, so blurred noise, which is not
+/// seen, is not made up for either. 1 for less than three pixels a side.
+fn signal_share(gamma: &Autocorrelation) -> f64 {
+    if gamma.height().min(gamma.width()) < 3 {
+        return 1.0;
+    }
+    let mean = |d: isize| 0.5 * (f64::from(gamma.at(0, d)) + f64::from(gamma.at(d, 0)));
+    (2.0 * mean(1) - mean(2)).clamp(0.0, 1.0)
 }
 
 /// The picture reduced to `size`, with its local mean taken away and its local contrast made equal:
@@ -195,4 +213,55 @@ pub fn reduced_size((height, width): (usize, usize), side: f64) -> (usize, usize
 
 fn scaled(basis: Basis, scale: [f64; 2]) -> Basis {
     basis.map(|v| [v[0] * scale[0], v[1] * scale[1]])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::rng::Rng;
+
+    const SIZE: (usize, usize) = (180, 200);
+
+    /// Discs on a lattice, of a variance of about 1, with white noise of this variance.
+    fn discs(noise: f64) -> Vec<f32> {
+        let mut rng = Rng::new(4, 0, 0, 0);
+        let mut white = || {
+            let sum: f64 = (0..12).map(|_| f64::from(rng.below(1 << 16)) / 65536.0 - 0.5).sum();
+            noise.sqrt() * sum
+        };
+        let disc = |i: usize| {
+            let (y, x) = ((i / SIZE.1 % 20) as f64 - 10.0, (i % SIZE.1 % 25) as f64 - 12.0);
+            if y.hypot(x) < 8.0 { 1.2 } else { -0.8 }
+        };
+        (0..SIZE.0 * SIZE.1).map(|i| (disc(i) + white()) as f32).collect()
+    }
+
+    #[test]
+    fn the_share_of_the_signal_is_what_was_put_in() {
+        let clean = discs(0.0);
+        let n = clean.len() as f64;
+        let mean = clean.iter().map(|&v| f64::from(v)).sum::<f64>() / n;
+        let variance = clean.iter().map(|&v| (f64::from(v) - mean).powi(2)).sum::<f64>() / n;
+        for noise in [0.0, 0.3, 1.0, 4.0] {
+            let share = signal_share(&Autocorrelation::new(&[discs(noise)], SIZE));
+            let want = variance / (variance + noise);
+            assert!((share - want).abs() < 0.03, "noise {noise}: {share}, not {want}");
+        }
+        assert_eq!(signal_share(&Autocorrelation::new(&[vec![1.0, 2.0, 5.0, 1.0]], (2, 2))), 1.0);
+    }
+
+    #[test]
+    fn noise_does_not_hide_a_lattice() {
+        let found = |noise: f64| {
+            let pixels: Vec<[f32; 3]> = discs(noise).into_iter().map(|v| [v; 3]).collect();
+            let ctx = Ctx::new(0, 1).expect("pool");
+            find(&ctx, &pixels, SIZE, None, 0.0, false).expect("not cancelled").expect("a guess")
+        };
+        for noise in [0.0, 2.0, 5.0] {
+            let Found { basis: [v1, v2], confidence, .. } = found(noise);
+            assert!(confidence > 0.5, "noise {noise}: {confidence}");
+            let off = [v1[0], v1[1].abs() - 20.0, v2[0] - 25.0, v2[1]];
+            assert!(off.iter().all(|v| v.abs() < 0.5), "noise {noise}: {v1:?} {v2:?}");
+        }
+    }
 }
