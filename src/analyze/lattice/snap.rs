@@ -6,8 +6,8 @@ use crate::signal::basis::{Basis, Vector, coefficients, combined, dot, dual};
 pub const MOST_SCALING: f64 = 0.03;
 
 /// The same of pieces that are laid in step at a size that was asked for: better all bricks narrower or
-/// wider than some cut, as seen on a dozen walls, floors and cloths. Every size has whole periods
-/// within the root of two, but for those that hold hardly one.
+/// wider than some cut, as seen on a dozen walls, floors and cloths. Where displacements lie along the
+/// axes, every size that holds about one has whole periods within the root of two.
 pub const MOST_SCALING_ASKED: f64 = 0.45;
 
 /// By how much a displacement may miss the axis: as a share of the shortest vector, and in pixels if
@@ -26,8 +26,8 @@ pub struct Snap {
     pub width: usize,
     /// Height in pixels, after scaling.
     pub height: usize,
-    /// By what the photo's width must be multiplied so that `width` is a whole number of periods;
-    /// within 3 % of 1.
+    /// By what the photo's width must be multiplied so that `width` is a whole number of periods; as
+    /// far from 1 as was allowed, by [`Lattice::snap`](crate::Lattice::snap) 3 %.
     pub scale_x: f64,
     /// By what the photo's height must be multiplied, likewise.
     pub scale_y: f64,
