@@ -136,7 +136,7 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Vec
     let mut lines = Vec::new();
     for (path, tile) in request.tiles.iter().zip(&tiles) {
         session.check()?;
-        let record = summary::record(&tile.report);
+        let record = summary::record(tile.report.seed, &tile.report.params, None);
         let bytes = files::encode(&tile.picture, Some(path), MapKind::Color, Some(&record))?;
         session.staging.stage(path, &bytes)?;
         let (width, height) = tile.report.tile_size;

@@ -101,11 +101,10 @@ impl Written {
 }
 
 /// How the tile was made, for the file itself. Holds nothing that differs between equal runs.
-pub(super) fn record(report: &Report) -> String {
-    let Report { version, seed, .. } = report;
-    let params = typed_params(&TileParams::schema(), &report.params);
-    let mut record = record_of(TileParams::VERB, version, *seed, &params);
-    if let Some(rect) = report.redo {
+pub(super) fn record(seed: u64, params: &[(&'static str, String)], redo: Option<Rect>) -> String {
+    let params = typed_params(&TileParams::schema(), params);
+    let mut record = record_of(TileParams::VERB, env!("CARGO_PKG_VERSION"), seed, &params);
+    if let Some(rect) = redo {
         record["redo"] = serde_json::json!(rect);
     }
     record.to_string()

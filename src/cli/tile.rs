@@ -20,7 +20,7 @@ use crate::image::sheet;
 use crate::verb::inputs::Inputs;
 use crate::verb::params::{Method, TileParams};
 use crate::verb::redo::Redo;
-use crate::verb::tile::{Tile, tiles};
+use crate::verb::tile::{Draft, Tile, tiles_meanwhile};
 
 /// Longest side of a preview in pixels; what a screen shows at once.
 const PREVIEW_SIDE: usize = 2048;
@@ -46,7 +46,60 @@ struct Place {
     preview: Option<PathBuf>,
 }
 
+/// What became of a tile.
+struct Staged {
+    /// The files that wait for their names.
+    written: Vec<Written>,
+    /// What goes to standard output.
+    piped: Option<Vec<u8>>,
+}
+
 impl Place {
+    /// Encodes and stages all files of a tile; the maps follow it.
+    fn stage(
+        &self,
+        session: &Session,
+        draft: &Draft<'_>,
+        record: &str,
+        maps: &[Map],
+    ) -> Result<Staged> {
+        let mut staged = Staged { written: Vec::new(), piped: None };
+        let mut stage =
+            |role, name: Option<&str>, path: &Path, bytes: Vec<u8>, picture: &Picture| {
+                session.check()?;
+                session.staging.stage(path, &bytes)?;
+                let (width, height) = (picture.width(), picture.height());
+                staged.written.push(Written::new(role, name, path, width, height));
+                Ok(())
+            };
+        let picture = draft.picture;
+        let file = self.tile.file();
+        let bytes = files::encode(picture, file, MapKind::Color, Some(record))?;
+        match file {
+            Some(path) => stage("tile", None, path, bytes, picture)?,
+            None => staged.piped = Some(bytes),
+        }
+        if let Some(source_map) = draft.source_map {
+            for Map { wanted, pictures } in maps {
+                let maps: Vec<&Picture> = pictures.iter().collect();
+                let map = source_map.apply_all(&maps, wanted.kind)?;
+                let to = self.map(wanted.name, &map);
+                let bytes = files::encode(&map, Some(&to), wanted.kind, None)?;
+                stage("map", Some(wanted.name), &to, bytes, &map)?;
+            }
+            if let Some(path) = &self.source_map {
+                let bytes = files::encode_source_map(source_map, path)?;
+                stage("source_map", None, path, bytes, picture)?;
+            }
+        }
+        if let Some(path) = &self.preview {
+            let tiling = sheet::repeated(picture, 3, PREVIEW_SIDE)?;
+            let bytes = files::encode(&tiling, Some(path), MapKind::Color, None)?;
+            stage("preview", None, path, bytes, &tiling)?;
+        }
+        Ok(staged)
+    }
+
     /// The file of a map of the tile.
     fn map(&self, name: &str, map: &Picture) -> PathBuf {
         output_path(self.tile.file().unwrap_or(Path::new("tile.png")), name, map)
@@ -161,6 +214,7 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Vec
         None => None,
         Some((rect, path)) => Some((*rect, files::read_source_map(path)?)),
     };
+    let redone_rect = redone.as_ref().map(|(rect, _)| *rect);
     let redo = redone.as_ref().map(|(rect, of)| Redo { of, rect: *rect });
     let (photo, inputs) = (&pictures.photo, Inputs { redo, ..pictures.inputs() });
     let places = |name: &str, map: &Picture| -> Vec<PathBuf> {
@@ -172,49 +226,19 @@ fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Vec
     files::ensure_can_hold(photo, request.places[0].tile.file(), MapKind::Color)?;
     session.check()?;
 
-    // The long work.
-    let made = tiles(ctx, &inputs, &request.params, request.places.len())?;
-    notes.extend(made[0].report.notes.iter().cloned());
-
-    // Encode and stage every file; the maps follow the tiles.
+    // The long work. Every file is staged as soon as its pixels are there.
+    let record = |draft: &Draft<'_>| summary::record(draft.seed, draft.params, redone_rect);
+    let made = tiles_meanwhile(ctx, &inputs, &request.params, request.places.len(), |draft| {
+        request.places[draft.number].stage(session, draft, &record(draft), &maps)
+    })?;
+    notes.extend(made[0].0.report.notes.iter().cloned());
     let mut written = Vec::new();
     let mut done = Vec::new();
     let mut piped = None;
-    for (place, Tile { picture, source_map, report, .. }) in request.places.iter().zip(made) {
-        let mut stage =
-            |role, name: Option<&str>, path: &Path, bytes: Vec<u8>, picture: &Picture| {
-                session.check()?;
-                session.staging.stage(path, &bytes)?;
-                let (width, height) = (picture.width(), picture.height());
-                written.push(Written::new(role, name, path, width, height));
-                Ok(())
-            };
-        let record = summary::record(&report);
-        let file = place.tile.file();
-        let bytes = files::encode(&picture, file, MapKind::Color, Some(&record))?;
-        match file {
-            Some(path) => stage("tile", None, path, bytes, &picture)?,
-            None => piped = Some(bytes),
-        }
-        if let Some(source_map) = &source_map {
-            for Map { wanted, pictures } in &maps {
-                let maps: Vec<&Picture> = pictures.iter().collect();
-                let map = source_map.apply_all(&maps, wanted.kind)?;
-                let to = place.map(wanted.name, &map);
-                let bytes = files::encode(&map, Some(&to), wanted.kind, None)?;
-                stage("map", Some(wanted.name), &to, bytes, &map)?;
-            }
-            if let Some(path) = &place.source_map {
-                let bytes = files::encode_source_map(source_map, path)?;
-                stage("source_map", None, path, bytes, &picture)?;
-            }
-        }
-        if let Some(path) = &place.preview {
-            let tiling = sheet::repeated(&picture, 3, PREVIEW_SIDE)?;
-            let bytes = files::encode(&tiling, Some(path), MapKind::Color, None)?;
-            stage("preview", None, path, bytes, &tiling)?;
-        }
+    for (place, (Tile { report, .. }, staged)) in request.places.iter().zip(made) {
         done.push((place.tile.clone(), report));
+        written.extend(staged.written);
+        piped = piped.or(staged.piped);
     }
 
     // All is computed: now the files get their names, all or none.

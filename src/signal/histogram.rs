@@ -3,6 +3,8 @@
 //! Values are *soft codes*: codes of the matching space (`0..=127`) with six bits of fraction, so
 //! that means of codes lose nothing that matters and everything below is integer in, integer out.
 
+use rayon::prelude::*;
+
 /// Soft codes of one pixel: three colour channels and local contrast.
 pub type Soft = [u16; 4];
 
@@ -66,24 +68,6 @@ impl Distribution {
         Self::from_masses(&masses.iter().map(|&m| m as f64).collect::<Vec<_>>())
     }
 
-    /// The distribution of channel `k`; `None` of no pixels. Counts are integers: any order of
-    /// work gives the same.
-    pub fn of_channel(pixels: &[Soft], k: usize) -> Option<Self> {
-        use rayon::prelude::*;
-        const CHUNK: usize = 1 << 16;
-        let count = |chunk: &[Soft]| {
-            let mut masses = [0u64; BINS];
-            chunk.iter().for_each(|px| masses[bin_of(px[k]).0] += 1);
-            masses
-        };
-        let sum = |mut a: [u64; BINS], b: [u64; BINS]| {
-            a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
-            a
-        };
-        let masses = pixels.par_chunks(CHUNK).map(count).reduce(|| [0; BINS], sum);
-        Self::from_masses(&masses.map(|m| m as f64))
-    }
-
     /// The share of values below `v`.
     #[inline]
     pub fn share_below(&self, v: u16) -> f32 {
@@ -107,6 +91,35 @@ impl Distribution {
             })
             .collect();
         Quantiles { table }
+    }
+}
+
+/// How many pixels have each soft code.
+#[derive(Debug)]
+pub struct Counts(Vec<u32>);
+
+impl Counts {
+    /// Of channel `k`. Counts are integers: any order of work gives the same.
+    pub fn of_channel(pixels: &[Soft], k: usize) -> Self {
+        // A chunk has more pixels than there are counts to be added up.
+        const CHUNK: usize = 1 << 15;
+        let nothing = || vec![0; usize::from(SOFT_MAX) + 1];
+        let count = |mut counts: Vec<u32>, chunk: &[Soft]| {
+            chunk.iter().for_each(|px| counts[usize::from(px[k])] += 1);
+            counts
+        };
+        let sum = |mut a: Vec<u32>, b: Vec<u32>| {
+            a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
+            a
+        };
+        Self(pixels.par_chunks(CHUNK).fold(nothing, count).reduce(nothing, sum))
+    }
+
+    /// The distribution; `None` of no pixels.
+    pub fn distribution(&self) -> Option<Distribution> {
+        let mut masses = [0u64; BINS];
+        (0..).zip(&self.0).for_each(|(v, &n)| masses[bin_of(v).0] += u64::from(n));
+        Distribution::from_masses(&masses.map(|n| n as f64))
     }
 }
 
@@ -153,15 +166,19 @@ impl Quantiles {
         self.table[i] + (self.table[i + 1] - self.table[i]) * (at - i as f32)
     }
 
-    /// For every soft code v of something distributed as `own`: the value `(1 - alpha) v + alpha
-    /// Q(F_own(v))`, `Q` being these quantiles.
-    pub fn matching_table(&self, own: &Distribution, alpha: f32) -> Vec<u16> {
-        (0..=SOFT_MAX)
-            .map(|v| {
-                let wanted = self.at(own.share_below(v));
-                rounded(v as f32 + alpha * (wanted - v as f32))
-            })
-            .collect()
+    /// For every soft code v that there is: the value `(1 - alpha) v + alpha Q(F_own(v))`, `Q` being
+    /// these quantiles and `F_own` the distribution of what was counted. Codes that nothing has stay
+    /// as they are.
+    pub fn matching_table(&self, own: &Counts, alpha: f32) -> Vec<u16> {
+        let Some(distribution) = own.distribution() else { return (0..=SOFT_MAX).collect() };
+        let matched = |(v, &n): (u16, &u32)| {
+            if n == 0 {
+                return v;
+            }
+            let wanted = self.at(distribution.share_below(v));
+            rounded(v as f32 + alpha * (wanted - v as f32))
+        };
+        (0..).zip(&own.0).map(matched).collect()
     }
 }
 
@@ -178,6 +195,38 @@ pub fn rounded(v: f32) -> u16 {
 mod tests {
     use super::*;
 
+    fn counts(values: impl Iterator<Item = u16>) -> Counts {
+        Counts::of_channel(&values.map(|v| [7, v, 0, SOFT_MAX]).collect::<Vec<_>>(), 1)
+    }
+
+    #[test]
+    fn counts_are_of_every_code_and_make_the_same_distribution() {
+        let pixels: Vec<Soft> = (0..100_000u32)
+            .map(|i| [(i * 7919 % 3001) as u16, (i % 13) as u16, SOFT_MAX, 0])
+            .collect();
+        for k in 0..4 {
+            let counts = Counts::of_channel(&pixels, k);
+            for v in (0..=SOFT_MAX).step_by(7).chain([1, 12, SOFT_MAX]) {
+                let n = pixels.iter().filter(|px| px[k] == v).count();
+                assert_eq!(counts.0[usize::from(v)] as usize, n, "{v} of channel {k}");
+            }
+            let want = Distribution::of(pixels.iter().map(|px| px[k])).expect("some");
+            assert_eq!(counts.distribution().expect("some").cdf, want.cdf, "channel {k}");
+        }
+        assert!(Counts::of_channel(&[], 0).distribution().is_none());
+    }
+
+    #[test]
+    fn codes_that_nothing_has_stay_as_they_are() {
+        let own = counts((0..1000).map(|i| 2000 + 2 * i));
+        let wanted = Distribution::of((0..1000).map(|i| 100 + i)).expect("some").quantiles();
+        let table = wanted.matching_table(&own, 1.0);
+        for v in 0..=SOFT_MAX {
+            let there = (2000..4000).contains(&v) && v % 2 == 0;
+            assert_eq!(table[usize::from(v)] == v, !there, "{v} became {}", table[usize::from(v)]);
+        }
+    }
+
     #[test]
     fn quantiles_invert_the_distribution() {
         let skewed = || (0..5000u32).map(|i| ((i * 7919) % 5000).pow(2) / 3100).map(|v| v as u16);
@@ -193,13 +242,13 @@ mod tests {
     fn a_distribution_matched_to_itself_moves_by_less_than_a_code() {
         let values = || (0..3000u16).map(|i| 1000 + (i * 7) % 4000);
         let own = Distribution::of(values()).expect("some");
-        let table = own.quantiles().matching_table(&own, 1.0);
+        let table = own.quantiles().matching_table(&counts(values()), 1.0);
         assert!(values().all(|v| table[v as usize].abs_diff(v) < 64), "moved");
     }
 
     #[test]
     fn matching_shifts_a_shifted_distribution() {
-        let own = Distribution::of((0..1000).map(|i| 2000 + i)).expect("some");
+        let own = counts((0..1000).map(|i| 2000 + i));
         let wanted = Distribution::of((0..1000).map(|i| 4000 + 2 * i)).expect("some").quantiles();
         let table = wanted.matching_table(&own, 1.0);
         let half = wanted.matching_table(&own, 0.5);

@@ -260,42 +260,33 @@ impl Grid {
         top + (bottom - top) * fy
     }
 
-    /// For every pixel what its code becomes by the tables of the cells around it, blended:
-    /// `put(result, pixel, value)`. A table holds `n` values, at the edges of the codes' bins;
-    /// `place` says in which bin a pixel lies and where in it.
-    ///
-    /// # Determinism
-    /// Same bytes for any thread count.
+    /// For every pixel of row `y` what its code becomes by the tables of the cells around it, blended:
+    /// `put(column, value)`. A table holds `n` values, at the edges of the codes' bins; `place` says in
+    /// which bin the pixel of a column lies and where in it. `blended` is room for a row of tables.
+    #[inline]
     pub fn look_up(
         &self,
         tables: &[f32],
         n: usize,
-        place: impl Fn(usize) -> (usize, f32) + Sync,
-        out: &mut [f32],
-        put: impl Fn(&mut f32, usize, f32) + Sync,
+        y: usize,
+        place: impl Fn(usize) -> (usize, f32),
+        blended: &mut Vec<f32>,
+        mut put: impl FnMut(usize, f32),
     ) {
-        let width = self.cols.place.len();
         let row_len = self.cols.n * n;
-        out.par_chunks_mut(width).enumerate().for_each_init(
-            || vec![0f32; row_len],
-            |blended, (y, row)| {
-                // The tables of the two cell rows, blended once for the whole pixel row.
-                let (y0, y1, fy) = self.rows.place[y];
-                let (upper, lower) = (&tables[y0 * row_len..], &tables[y1 * row_len..]);
-                for ((t, &a), &b) in blended.iter_mut().zip(upper).zip(lower) {
-                    *t = a + (b - a) * fy;
-                }
-                for (x, (out, &(x0, x1, fx))) in row.iter_mut().zip(&self.cols.place).enumerate() {
-                    let i = y * width + x;
-                    let (bin, at) = place(i);
-                    let value = |cell: usize| {
-                        let i = cell * n + bin;
-                        blended[i] + (blended[i + 1] - blended[i]) * at
-                    };
-                    put(out, i, value(x0) + (value(x1) - value(x0)) * fx);
-                }
-            },
-        );
+        // The tables of the two cell rows, blended once for the whole pixel row.
+        let (y0, y1, fy) = self.rows.place[y];
+        let (upper, lower) = (&tables[y0 * row_len..][..row_len], &tables[y1 * row_len..]);
+        blended.clear();
+        blended.extend(upper.iter().zip(lower).map(|(&a, &b)| a + (b - a) * fy));
+        for (x, &(x0, x1, fx)) in self.cols.place.iter().enumerate() {
+            let (bin, at) = place(x);
+            let value = |cell: usize| {
+                let i = cell * n + bin;
+                blended[i] + (blended[i + 1] - blended[i]) * at
+            };
+            put(x, value(x0) + (value(x1) - value(x0)) * fx);
+        }
     }
 
     /// The pixel at the middle of every cell.

@@ -3,29 +3,29 @@
 use std::time::{Duration, Instant};
 
 use crate::analyze::lattice::snap::{MOST_SCALING, MOST_SCALING_ASKED, Snap};
-use crate::analyze::{stationarity, texture};
 use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
 use crate::base::memory::ensure_available;
 use crate::base::params::Value as _;
-use crate::image::color::ColorModel;
 use crate::image::mask::Mask;
 use crate::image::material::MapKind;
 use crate::image::picture::Picture;
 use crate::image::sigma_map::SigmaMap;
 use crate::image::sourcemap::SourceMap;
-use crate::method::stationary::{self, Dial, Evenness, Exemplar, Kept, Periods};
+use crate::method::stationary::{self, Dial, Exemplar, Kept, Periods};
 use crate::method::{flatten, make_seamless};
 use crate::search::patchmatch::Wrap;
-use crate::signal::measure::Statistic;
-use crate::signal::window::Domain;
+use crate::verb::costs::costs;
 use crate::verb::inputs::Inputs;
 use crate::verb::lattice::glanced;
 use crate::verb::params::{Axis, Follow, Measure, Method, Quality, Size, Symmetries, TileParams};
-use crate::verb::tile::{Costs, MAX_VARIANTS, Report, Step, Tile};
+use crate::verb::tile::{MAX_VARIANTS, Report, Step, Tile};
 
 /// Longest side of a tile, in pixels.
 const MAX_TILE_SIDE: usize = 32_768;
+
+/// Parameters as text.
+type Shown = [(&'static str, String)];
 
 /// Photos that were checked and analysed, ready for tiles of any seed and sigma.
 #[derive(Debug)]
@@ -127,11 +127,18 @@ impl<'a> Maker<'a> {
         Ok(self.dial.insert(dial))
     }
 
-    /// Makes the tile of a seed: with the sigma of the parameters, or of a place on the dial.
+    /// Makes the tile of a seed: with the sigma of the parameters, or of a place on the dial. While its
+    /// costs are measured, `meanwhile` is given the picture, its source map and all parameters.
     ///
     /// # Errors
-    /// [`Error::Cancelled`].
-    pub(super) fn make(&self, ctx: &Ctx, seed: u64, stationarity: Option<f32>) -> Result<Tile> {
+    /// [`Error::Cancelled`]; those of `meanwhile`.
+    pub(super) fn make<T: Send>(
+        &self,
+        ctx: &Ctx,
+        seed: u64,
+        stationarity: Option<f32>,
+        meanwhile: impl FnOnce(&Picture, Option<&SourceMap>, &Shown) -> Result<T> + Send,
+    ) -> Result<(Tile, T)> {
         let start = Instant::now();
         let ctx = ctx.with_seed(seed);
         let (width, height) = self.size;
@@ -169,16 +176,22 @@ impl<'a> Maker<'a> {
             }
         })?;
         let made = start.elapsed();
-        let costs = ctx.install(|| Ok(measured(&photos, &picture, source_map.as_ref())))?;
+        let shown = params.show();
+        let ((costs, measuring), taken) = ctx.install(|| {
+            let map = source_map.as_ref();
+            let costs = || (measured(&photos, &picture, map), start.elapsed().saturating_sub(made));
+            Ok(rayon::join(costs, || meanwhile(&picture, map, &shown)))
+        })?;
+        let taken = taken?;
         let own = [
             Some(("synthesis", made.saturating_sub(tracing).as_secs_f64())),
             self.inputs.trace.then_some(("trace", tracing.as_secs_f64())),
-            Some(("costs", start.elapsed().saturating_sub(made).as_secs_f64())),
+            Some(("costs", measuring.as_secs_f64())),
         ];
         let report = Report {
             version: env!("CARGO_PKG_VERSION"),
             seed,
-            params: params.show(),
+            params: shown,
             sigma: params.sigma,
             stationarity,
             photo_size: (photos[0].width(), photos[0].height()),
@@ -189,7 +202,7 @@ impl<'a> Maker<'a> {
             seconds: self.seconds.iter().copied().chain(own.into_iter().flatten()).collect(),
             notes: self.notes.clone(),
         };
-        Ok(Tile { picture, source_map, report, trace })
+        Ok((Tile { picture, source_map, report, trace }, taken))
     }
 }
 
@@ -457,35 +470,4 @@ fn plan(
         coarse_iterations,
         fine_iterations,
     }
-}
-
-fn costs(
-    photos: &[&Picture],
-    picture: &Picture,
-    map: Option<&SourceMap>,
-    params: &TileParams,
-    sigma_map: Option<&SigmaMap>,
-    wrap: Wrap,
-) -> Costs {
-    let (pixels, domain) = colors(photos[0], picture, wrap);
-    let (height, width) = (domain.height, domain.width);
-    let sigma = f64::from(params.sigma) * height.min(width) as f64;
-    let stationarity = stationarity::histogram_cost(&pixels, domain, sigma);
-    let by_measure = |evenness: Evenness| match evenness.statistic {
-        Statistic::Histogram if sigma_map.is_none() => stationarity,
-        other => other.cost(&pixels, domain, &evenness.window((height, width), domain)),
-    };
-    Costs {
-        texture: map.map(|map| texture::cost_bound(&pixels, photos, map, params.patch, wrap)),
-        stationarity,
-        stationarity_by_measure: params.evenness(sigma_map).map(by_measure),
-    }
-}
-
-/// A tile's pixels in the space in which its photo is matched (L*a*b* for colours), and its domain.
-pub(super) fn colors(photo: &Picture, tile: &Picture, wrap: Wrap) -> (Vec<[f32; 3]>, Domain) {
-    let model = ColorModel::new(photo);
-    let pixels = model.matching_pixels(tile);
-    let (height, width) = (tile.height(), tile.width());
-    (pixels, Domain { height, width, wrap_y: wrap.y, wrap_x: wrap.x })
 }

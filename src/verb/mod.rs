@@ -1,5 +1,6 @@
 //! Room 7: the public functions, one file each. They pick methods, combine them and report.
 
+mod costs;
 pub mod extract;
 pub mod inputs;
 pub mod lattice;

@@ -5,8 +5,9 @@ use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
 use crate::image::picture::Picture;
 use crate::image::sheet::{self, Cell};
+use crate::verb::costs::colors;
 use crate::verb::inputs::Inputs;
-use crate::verb::maker::{Maker, colors, wrap};
+use crate::verb::maker::{Maker, wrap};
 use crate::verb::params::TileParams;
 use crate::verb::tile::Tile;
 
@@ -84,8 +85,10 @@ pub fn palette(
     ctx.begin(maker.work(steps, true));
     let curve = maker.learn_dial(ctx)?.points().to_vec();
     let place = |i: usize| i as f32 / (steps - 1) as f32;
-    let tiles = (0..steps).map(|i| maker.make(ctx, ctx.seed, Some(place(i))));
-    let tiles = tiles.collect::<Result<Vec<Tile>>>()?;
+    let tile = |i: usize| -> Result<Tile> {
+        Ok(maker.make(ctx, ctx.seed, Some(place(i)), |_, _, _| Ok(()))?.0)
+    };
+    let tiles = (0..steps).map(tile).collect::<Result<Vec<Tile>>>()?;
     let differences = ctx.install(|| {
         let look = |tile: &Tile| {
             let (pixels, domain) = colors(inputs.photo, &tile.picture, wrap(&params));

@@ -8,31 +8,13 @@ use crate::image::mask::Mask;
 use crate::image::picture::Picture;
 use crate::image::rect::Rect;
 use crate::image::sourcemap::SourceMap;
+pub use crate::verb::costs::Costs;
 use crate::verb::inputs::Inputs;
 use crate::verb::maker::Maker;
 use crate::verb::params::TileParams;
 
 /// Most tiles of one run.
 pub const MAX_VARIANTS: usize = 1000;
-
-/// What the finished tile costs, measured on the delivered picture. Lower is better.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Costs {
-    /// Texture cost: mean over pixels of the squared CIE L*a*b* distance per patch pixel between
-    /// the tile's patch and the photo's patch named by the source map (paper eq. 5). An upper
-    /// bound of the exact cost, which takes the best patch of the whole photo, averaged over an
-    /// even grid of patches. `None` for [`Method::MakeSeamless`], whose pixels are not the photo's.
-    pub texture: Option<f64>,
-    /// Stationarity cost: mean earth mover's distance between the local histograms of two places,
-    /// summed over L*, a* and b* (paper eq. 1 and 3), in L*a*b* units.
-    pub stationarity: f64,
-    /// The cost under the measure of the parameters: the same number for the histogram; for the
-    /// moments, the mean squared difference of two places' moments (of values counted from the
-    /// mean in tens of units), in L*a*b* units squared (paper eq. 2); for the steerable filters,
-    /// the earth mover's distance summed over twelve responses, in L*a*b* units (paper eq. 4).
-    /// `None` without a measure. Comparable between tiles of the same measure and order only.
-    pub stationarity_by_measure: Option<f64>,
-}
 
 /// How a tile was made and what it costs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -137,6 +119,34 @@ pub fn tiles(
     params: &TileParams,
     count: usize,
 ) -> Result<Vec<Tile>> {
+    let made = tiles_meanwhile(ctx, inputs, params, count, |_| Ok(()))?;
+    Ok(made.into_iter().map(|(tile, ())| tile).collect())
+}
+
+/// A tile whose costs are being measured.
+#[derive(Debug)]
+pub(crate) struct Draft<'a> {
+    /// Which of the run's tiles it is, from 0.
+    pub(crate) number: usize,
+    pub(crate) seed: u64,
+    /// As [`Report::params`].
+    pub(crate) params: &'a [(&'static str, String)],
+    pub(crate) picture: &'a Picture,
+    pub(crate) source_map: Option<&'a SourceMap>,
+}
+
+/// As [`tiles`]. What `meanwhile` does with each tile, such as writing it, is done while its costs are
+/// measured, and comes back with it.
+///
+/// # Errors
+/// As [`tiles`]; those of `meanwhile`.
+pub(crate) fn tiles_meanwhile<T: Send>(
+    ctx: &Ctx,
+    inputs: &Inputs<'_>,
+    params: &TileParams,
+    count: usize,
+    meanwhile: impl Fn(&Draft<'_>) -> Result<T> + Sync,
+) -> Result<Vec<(Tile, T)>> {
     let further = count.saturating_sub(1) as u64;
     let last = ctx.seed.checked_add(further).ok_or_else(|| {
         let expected = format!("at most {} with {count} variants", u64::MAX - further);
@@ -147,5 +157,11 @@ pub fn tiles(
     if params.stationarity.is_some() {
         maker.learn_dial(ctx)?;
     }
-    (ctx.seed..=last).map(|seed| maker.make(ctx, seed, params.stationarity)).collect()
+    let make = |(number, seed): (usize, u64)| {
+        let place = params.stationarity;
+        maker.make(ctx, seed, place, |picture, source_map, params| {
+            meanwhile(&Draft { number, seed, params, picture, source_map })
+        })
+    };
+    (0..).zip(ctx.seed..=last).map(make).collect()
 }

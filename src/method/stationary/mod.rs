@@ -28,7 +28,7 @@ use crate::search::seams;
 use crate::search::source::Source;
 use crate::search::vote::{Votes, vote};
 use crate::signal::basis::Basis;
-use crate::signal::histogram::{Distribution, SOFT_BITS};
+use crate::signal::histogram::{Counts, SOFT_BITS};
 use crate::signal::measure::Statistic;
 use crate::signal::resample::resized;
 use crate::signal::window::{Domain, Window};
@@ -422,14 +422,14 @@ fn match_global(votes: &mut Votes, level: &Level, alpha: f32) {
     let soft = &votes.soft;
     let table = |k: usize| {
         let alpha = if k == CONTRAST { alpha.max(CONTRAST_PULL) } else { alpha };
-        (alpha > 0.0).then(|| {
-            let own = Distribution::of_channel(soft, k).expect("some pixels");
-            (k, level.quantiles[k].matching_table(&own, alpha))
-        })
+        let table = || level.quantiles[k].matching_table(&Counts::of_channel(soft, k), alpha);
+        (alpha > 0.0).then(|| (k, table()))
     };
     let tables: Vec<(usize, Vec<u16>)> = (0..4).into_par_iter().filter_map(table).collect();
-    votes.soft.par_iter_mut().for_each(|px| {
-        tables.iter().for_each(|(k, table)| px[*k] = table[px[*k] as usize]);
+    votes.soft.par_chunks_mut(votes.width).for_each(|row| {
+        for (k, table) in &tables {
+            row.iter_mut().for_each(|px| px[*k] = table[usize::from(px[*k])]);
+        }
     });
 }
 

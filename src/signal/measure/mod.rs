@@ -73,27 +73,36 @@ struct Mapping {
     tables: Vec<f32>,
 }
 
-/// What every pixel's code should become, in soft codes: `mapping` is asked for each size of window,
-/// and the answers are blended as the window says.
-fn wanted(
-    code: impl Fn(usize) -> u16 + Sync,
-    domain: Domain,
-    window: &Window,
-    mapping: impl Fn(f64) -> Mapping,
-) -> Vec<f32> {
-    let mut wanted = vec![0f32; domain.height * domain.width];
-    for scale in window.scales() {
-        let Mapping { grid, tables } = mapping(scale.sigma);
-        let place = |i: usize| bin_of(code(i));
-        match &scale.weight {
-            None => grid.look_up(&tables, EDGES, place, &mut wanted, |out, _, v| *out = v),
-            Some(weight) => {
-                let add = |out: &mut f32, i: usize, v: f32| *out += weight[i] * v;
-                grid.look_up(&tables, EDGES, place, &mut wanted, add);
+/// What every pixel's code should become: a mapping for each size of window, blended as it says.
+struct Wanted<'a> {
+    /// Each with its weight at every pixel (`None`: 1).
+    mappings: Vec<(Mapping, Option<&'a [f32]>)>,
+}
+
+impl<'a> Wanted<'a> {
+    /// `mapping` is asked for each size of window.
+    fn new(window: &'a Window, mapping: impl Fn(f64) -> Mapping) -> Self {
+        let scales = window.scales().iter();
+        let mappings = scales.map(|scale| (mapping(scale.sigma), scale.weight.as_deref()));
+        Self { mappings: mappings.collect() }
+    }
+
+    /// Of the pixels of row `y`, in soft codes; `blended` is room for tables.
+    fn row(&self, y: usize, code: impl Fn(usize) -> u16, blended: &mut Vec<f32>, out: &mut [f32]) {
+        let place = |x: usize| bin_of(code(x));
+        let first = y * out.len();
+        out.fill(0.0);
+        for (Mapping { grid, tables }, weight) in &self.mappings {
+            match weight {
+                None => grid.look_up(tables, EDGES, y, place, blended, |x, v| out[x] = v),
+                Some(weight) => {
+                    let weight = &weight[first..][..out.len()];
+                    let add = |x: usize, v: f32| out[x] += weight[x] * v;
+                    grid.look_up(tables, EDGES, y, place, blended, add);
+                }
             }
         }
     }
-    wanted
 }
 
 /// Moves the codes of each of these channels that is not constant by `share` towards what `mapping(codes,
@@ -110,16 +119,22 @@ fn project_channels(
         let first = pixels[0][k];
         let code = |i: usize| pixels[i][k];
         let varies = pixels.iter().any(|px| px[k] != first);
-        varies.then(|| (k, wanted(code, domain, window, |sigma| mapping(&code, sigma))))
+        varies.then(|| (k, Wanted::new(window, |sigma| mapping(&code, sigma))))
     };
     // Of a small picture a channel alone is too little work to share.
-    let wanted: Vec<(usize, Vec<f32>)> = channels.into_par_iter().filter_map(wanted).collect();
-    pixels.par_iter_mut().enumerate().for_each(|(i, px)| {
-        for (k, wanted) in &wanted {
-            let now = px[*k] as f32;
-            px[*k] = rounded(now + share * (wanted[i] - now));
-        }
-    });
+    let wanted: Vec<(usize, Wanted<'_>)> = channels.into_par_iter().filter_map(wanted).collect();
+    pixels.par_chunks_mut(domain.width).enumerate().for_each_init(
+        || (Vec::new(), vec![0.0; domain.width]),
+        |(blended, values), (y, row)| {
+            for (k, wanted) in &wanted {
+                wanted.row(y, |x| row[x][*k], blended, values);
+                for (px, &value) in row.iter_mut().zip(&*values) {
+                    let now = px[*k] as f32;
+                    px[*k] = rounded(now + share * (value - now));
+                }
+            }
+        },
+    );
 }
 
 /// Of the middles of a grid's cells, `n` numbers each: `cell(sigma)` gives a grid and the numbers of

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use crate::signal::histogram::{SOFT_BITS, Soft, rounded};
 use crate::signal::measure::histogram::{mapping, plane_cost};
-use crate::signal::measure::{project_channels, wanted};
+use crate::signal::measure::{Wanted, project_channels};
 use crate::signal::steerable::{rebuilt, responses};
 use crate::signal::window::{Domain, Window};
 
@@ -55,10 +55,15 @@ fn turn_into_change(band: &mut [f32], domain: Domain, window: &Window, share: f3
     }
     let scale = f32::from(ZERO) / most;
     let codes: Vec<u16> = band.par_iter().map(|v| rounded(f32::from(ZERO) + v * scale)).collect();
-    let code = |i: usize| codes[i];
-    let even = wanted(code, domain, window, |sigma| mapping(code, domain, sigma));
+    let wanted = Wanted::new(window, |sigma| mapping(|i| codes[i], domain, sigma));
     let share = share / scale;
-    band.par_iter_mut().zip(even).zip(&codes).for_each(|((v, even), &code)| {
-        *v = share * (even - f32::from(code));
-    });
+    band.par_chunks_mut(domain.width)
+        .zip(codes.par_chunks(domain.width))
+        .enumerate()
+        .for_each_init(Vec::new, |blended, (y, (row, codes))| {
+            wanted.row(y, |x| codes[x], blended, row);
+            for (v, &code) in row.iter_mut().zip(codes) {
+                *v = share * (*v - f32::from(code));
+            }
+        });
 }
