@@ -518,6 +518,10 @@ def main() -> int:
         lines += startup(args, small, work)
         if args.scaling:
             print("threads", file=sys.stderr)
+            if not args.photo:  # What start-up and files take shows less in a larger one.
+                side = 2 * max(first)
+                first[side] = work / f"first-{side}.png"
+                helper("photo", f"{side}x{side}", 0, first[side])
             lines += scaling(args, first, work)
         if args.fields:
             print("fields", file=sys.stderr)
