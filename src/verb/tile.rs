@@ -165,3 +165,50 @@ pub(crate) fn tiles_meanwhile<T: Send>(
     };
     (0..).zip(ctx.seed..=last).map(make).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::picture::{Encoding, Samples};
+    use crate::verb::params::Size;
+
+    fn photo() -> Picture {
+        let texels = (0..64 * 64).map(|i| ((i * 7919) % 251) as u8).collect();
+        Picture::new(64, 64, 1, Samples::U8(texels), Encoding::Srgb).expect("a picture")
+    }
+
+    fn params() -> TileParams {
+        TileParams { size: Size::Pixels { width: 40, height: 32 }, ..TileParams::default() }
+    }
+
+    #[test]
+    fn each_draft_is_the_tile_that_comes_back() {
+        let (photo, ctx) = (photo(), Ctx::new(5, 2).expect("pool"));
+        let made = tiles_meanwhile(&ctx, &Inputs::new(&photo), &params(), 3, |draft| {
+            let pixels = draft.picture.samples().clone();
+            Ok((draft.number, draft.seed, draft.params.to_vec(), pixels, draft.source_map.cloned()))
+        });
+        let made = made.expect("three tiles");
+        assert_eq!(made.len(), 3);
+        for (i, (tile, (number, seed, params, pixels, source_map))) in made.iter().enumerate() {
+            assert_eq!((*number, *seed), (i, 5 + i as u64));
+            assert_eq!((*seed, params), (tile.report.seed, &tile.report.params));
+            assert!(pixels == tile.picture.samples() && *source_map == tile.source_map, "tile {i}");
+        }
+        let alone = tiles(&ctx, &Inputs::new(&photo), &params(), 3).expect("three tiles");
+        for (tile, (with, _)) in alone.iter().zip(&made) {
+            assert!(tile.picture.samples() == with.picture.samples());
+            assert_eq!(tile.report.costs, with.report.costs);
+        }
+    }
+
+    #[test]
+    fn what_fails_meanwhile_fails_the_run() {
+        let (photo, ctx) = (photo(), Ctx::new(0, 2).expect("pool"));
+        let refused = || Error::Internal { message: "the disk is full".into() };
+        let made = tiles_meanwhile(&ctx, &Inputs::new(&photo), &params(), 3, |draft| {
+            if draft.number == 1 { Err(refused()) } else { Ok(()) }
+        });
+        assert_eq!(made.expect_err("no tiles").to_string(), refused().to_string());
+    }
+}
