@@ -74,8 +74,8 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
 }
 
 /// Lets the process keep what it frees. The allocator of GNU/Linux hands blocks back to the system
-/// and asks for new ones over and over, until it has seen a large one freed; new pages cost a tenth
-/// of a tile's time, and more where threads share the work. Other allocators do not mind.
+/// and asks for new ones over and over, until it has seen a large one freed; new pages take time,
+/// and more where threads share the work. Other allocators do not mind.
 fn keep_memory() {
     // It learns from blocks below 32 MiB. No page of this one is ever touched.
     const LARGE: usize = 31 << 20;

@@ -53,7 +53,7 @@ impl Products {
         let stride = half + BLOCK;
         // Columns one after the other: even frequencies, then odd.
         let rows = 2 * half;
-        // Touched by one thread: two that touch new pages side by side take five times as long.
+        // Touched by one thread: two that touch new pages side by side take several times as long.
         let mut power = Vec::new();
         power.resize(blocks * BLOCK * rows, 0.0);
         for (plane, mean) in planes.iter().zip(means) {
