@@ -19,7 +19,8 @@ pub struct Costs {
     /// Texture cost: mean over pixels of the squared CIE L*a*b* distance per patch pixel between
     /// the tile's patch and the photo's patch named by the source map (paper eq. 5). An upper
     /// bound of the exact cost, which takes the best patch of the whole photo, averaged over an
-    /// even grid of patches. `None` for [`Method::MakeSeamless`], whose pixels are not the photo's.
+    /// even grid of patches. `None` for
+    /// [`Method::MakeSeamless`](crate::Method::MakeSeamless), whose pixels are not the photo's.
     pub texture: Option<f64>,
     /// Stationarity cost: mean earth mover's distance between the local histograms of two places,
     /// summed over L*, a* and b* (paper eq. 1 and 3), in L*a*b* units.
