@@ -4,24 +4,24 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 use realfft::num_complex::Complex;
-use realfft::{ComplexToReal, RealFftPlanner};
-use rustfft::FftPlanner;
+use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 
-/// Columns that lie together: whole cache lines, and a band of them is a page.
-const BLOCK: usize = 8;
+use super::columns::{BLOCK, Bins, Columns};
 
-/// Rows that lie together.
-const BAND: usize = 32;
+/// Rows that lie together. Of a block of columns they are nearly a page; not a power of two, as blocks
+/// that far apart would displace each other from the cache.
+const BAND: usize = 31;
 
 const ZERO: Complex<f64> = Complex::new(0.0, 0.0);
+
+/// Some rows of a spectrum: blocks of columns one after the other, of each its rows.
+type Band = Vec<Bins>;
 
 /// The sums over the overlap of the products of the picture and its copy, of all planes together, for
 /// every displacement that is not upwards: transformed back but for the rows.
 pub(super) struct Products {
     width: usize,
-    /// Blocks of columns; of each, row by row, [`BLOCK`] bins.
-    columns: Vec<[f64; 2]>,
-    block_len: usize,
+    bands: Vec<Band>,
     backward: Arc<dyn ComplexToReal<f64>>,
 }
 
@@ -29,100 +29,36 @@ impl Products {
     /// Of `planes` less their `means`.
     pub(super) fn new(planes: &[Vec<f32>], means: &[f64], (height, width): (usize, usize)) -> Self {
         // Room for the moved copy, so that nothing wraps onto the picture.
-        let (half, cols) = (fast_size(height), fast_size(2 * width - 1));
+        let cols = fast_size(2 * width - 1);
         let mut reals = RealFftPlanner::<f64>::new();
         let forward = reals.plan_fft_forward(cols);
-        let mut plain = FftPlanner::<f64>::new();
-        let (down, up) = (plain.plan_fft_forward(half), plain.plan_fft_inverse(half));
-        // Padded to twice its length, a column's even frequencies are those of the column alone, its odd
-        // ones those of the column times these.
-        let turns: Vec<Complex<f64>> = (0..half)
-            .map(|y| {
-                let angle = -std::f64::consts::PI * y as f64 / half as f64;
-                Complex::new(libm::cos(angle), libm::sin(angle))
-            })
-            .collect();
-        let bins = cols / 2 + 1;
-        let blocks = bins.div_ceil(BLOCK);
-        let bands = height.div_ceil(BAND);
-        // Bands of rows; of each, blocks of columns: rows are written and columns read nearly in place.
-        // Blocks that are read back a power of two apart would displace each other from the cache.
-        let block_len = (height | 1) * BLOCK;
-        let mut spectrum = vec![[0.0; 2]; (bands * BAND * BLOCK).max(block_len) * blocks];
-        // Columns a power of two apart would displace each other from the cache.
-        let stride = half + BLOCK;
-        // Columns one after the other: even frequencies, then odd.
-        let rows = 2 * half;
-        // Touched by one thread: two that touch new pages side by side take several times as long.
-        let mut power = Vec::new();
-        power.resize(blocks * BLOCK * rows, 0.0);
-        for (plane, mean) in planes.iter().zip(means) {
-            // Rows; those of the padding are zero and stay out.
-            let bands = spectrum.par_chunks_mut(BAND * blocks * BLOCK);
-            bands.zip(plane.par_chunks(BAND * width)).for_each_init(
-                || (forward.make_input_vec(), vec![ZERO; BAND * bins], forward.make_scratch_vec()),
-                |(padded, local, scratch), (band, plane)| {
-                    for (row, out) in plane.chunks(width).zip(local.chunks_mut(bins)) {
-                        for (to, &from) in padded.iter_mut().zip(row) {
-                            *to = f64::from(from) - mean;
-                        }
-                        padded[width..].fill(0.0);
-                        let done = forward.process_with_scratch(padded, out, scratch);
-                        debug_assert!(done.is_ok(), "buffers are of the planned lengths");
-                    }
-                    for (b, block) in band.chunks_mut(BAND * BLOCK).enumerate() {
-                        for (to, from) in block.chunks_mut(BLOCK).zip(local.chunks(bins)) {
-                            let from = &from[b * BLOCK..];
-                            to.iter_mut().zip(from).for_each(|(to, v)| *to = [v.re, v.im]);
-                        }
-                    }
-                },
-            );
-            power.par_chunks_mut(BLOCK * rows).enumerate().for_each_init(
-                || (vec![ZERO; 2 * BLOCK * stride], vec![ZERO; down.get_inplace_scratch_len()]),
-                |(columns, scratch), (b, power)| {
-                    for (y, turn) in turns[..height].iter().enumerate() {
-                        let at = ((y / BAND * blocks + b) * BAND + y % BAND) * BLOCK;
-                        for (k, &[re, im]) in spectrum[at..][..BLOCK].iter().enumerate() {
-                            let value = Complex::new(re, im);
-                            columns[2 * k * stride + y] = value;
-                            columns[(2 * k + 1) * stride + y] = value * turn;
-                        }
-                    }
-                    for (column, power) in columns.chunks_mut(stride).zip(power.chunks_mut(half)) {
-                        let column = &mut column[..half];
-                        column[height..].fill(ZERO);
-                        down.process_with_scratch(column, scratch);
-                        power.iter_mut().zip(&*column).for_each(|(sum, v)| *sum += v.norm_sqr());
-                    }
-                },
-            );
+        let mut spectra: Vec<Vec<Band>> =
+            planes.iter().zip(means).map(|(p, mean)| rows(p, *mean, width, &*forward)).collect();
+        // The sums take the place of the last plane's spectrum, block by block.
+        let mut bands = spectra.pop().unwrap_or_default();
+        let blocks = (cols / 2 + 1).div_ceil(BLOCK);
+        let mut own: Vec<Vec<&mut [Bins]>> = Vec::new();
+        own.resize_with(blocks, Vec::new);
+        for band in &mut bands {
+            let len = band.len() / blocks;
+            own.iter_mut().zip(band.chunks_mut(len)).for_each(|(own, rows)| own.push(rows));
         }
-        // Columns back. The power is real, so both halves can be transformed as one.
-        let scale = 0.5 / (rows * cols) as f64;
-        let mut columns = spectrum;
-        columns.truncate(blocks * block_len);
-        columns.par_chunks_mut(block_len).zip(power.par_chunks(BLOCK * rows)).for_each_init(
-            || (vec![ZERO; half], vec![ZERO; up.get_inplace_scratch_len()]),
-            |(both, scratch), (block, power)| {
-                for (k, power) in power.chunks(rows).enumerate() {
-                    let (even, odd) = power.split_at(half);
-                    for (both, (&re, &im)) in both.iter_mut().zip(even.iter().zip(odd)) {
-                        *both = Complex::new(re, im);
-                    }
-                    up.process_with_scratch(both, scratch);
-                    let to = block[k..].iter_mut().step_by(BLOCK);
-                    let mirrored = both[..1].iter().chain(both[1..].iter().rev());
-                    for ((to, turn), (a, b)) in to.zip(&turns).zip(both.iter().zip(mirrored)) {
-                        let b = b.conj();
-                        let odd = a - b;
-                        let v = a + b + Complex::new(odd.im, -odd.re) * turn.conj();
-                        *to = [v.re * scale, v.im * scale];
-                    }
+        let columns = Columns::new(fast_size(height), height, cols);
+        own.into_par_iter().enumerate().for_each_init(
+            || columns.buffers(),
+            |buffers, (block, mut own)| {
+                for spectrum in &spectra {
+                    let rows = spectrum.iter().map(|band| {
+                        let len = band.len() / blocks;
+                        &band[block * len..][..len]
+                    });
+                    columns.add_power(buffers, rows);
                 }
+                columns.add_power(buffers, own.iter().map(|rows| &**rows));
+                columns.back(buffers, own.iter_mut().map(|rows| &mut **rows));
             },
         );
-        Self { width, columns, block_len, backward: reals.plan_fft_inverse(cols) }
+        Self { width, bands, backward: reals.plan_fft_inverse(cols) }
     }
 
     /// A reader of rows with buffers of its own.
@@ -131,6 +67,35 @@ impl Products {
         let (bins, scratch) = (self.backward.make_input_vec(), self.backward.make_scratch_vec());
         Rows { of: self, bins, full, scratch }
     }
+}
+
+/// Transforms the rows of a plane; those of the padding are zero and stay out.
+fn rows(plane: &[f32], mean: f64, width: usize, forward: &dyn RealToComplex<f64>) -> Vec<Band> {
+    let bins = forward.complex_len();
+    let blocks = bins.div_ceil(BLOCK);
+    let buffers = || {
+        let local = vec![[ZERO; BLOCK]; BAND * blocks];
+        (forward.make_input_vec(), local, forward.make_scratch_vec())
+    };
+    let bands = plane.par_chunks(BAND * width);
+    let band = |(padded, local, scratch): &mut (Vec<f64>, Band, Vec<_>), rows: &[f32]| {
+        let local = &mut local[..rows.len() / width * blocks];
+        for (row, out) in rows.chunks(width).zip(local.chunks_mut(blocks)) {
+            for (to, &from) in padded.iter_mut().zip(row) {
+                *to = f64::from(from) - mean;
+            }
+            padded[width..].fill(0.0);
+            let out = &mut out.as_flattened_mut()[..bins];
+            let done = forward.process_with_scratch(padded, out, scratch);
+            debug_assert!(done.is_ok(), "buffers are of the planned lengths");
+        }
+        let mut band = Vec::with_capacity(local.len());
+        for block in 0..blocks {
+            band.extend(local[block..].iter().step_by(blocks));
+        }
+        band
+    };
+    bands.map_init(buffers, band).collect()
 }
 
 /// Transforms rows back.
@@ -147,9 +112,11 @@ impl Rows<'_> {
     pub(super) fn row(&mut self, dy: usize) -> (&[f64], &[f64]) {
         let Self { of, bins, full, scratch } = self;
         let (width, cols) = (of.width, full.len());
-        for (to, block) in bins.chunks_mut(BLOCK).zip(of.columns.chunks(of.block_len)) {
-            let row = &block[dy * BLOCK..];
-            to.iter_mut().zip(row).for_each(|(to, &[re, im])| *to = Complex::new(re, im));
+        let band = &of.bands[dy / BAND];
+        let rows = band.len() / bins.len().div_ceil(BLOCK);
+        let blocks = band[dy % BAND..].iter().step_by(rows);
+        for (to, block) in bins.chunks_mut(BLOCK).zip(blocks) {
+            to.copy_from_slice(&block[..to.len()]);
         }
         // A real row has real outermost bins; the transform insists.
         bins[0].im = 0.0;
