@@ -2,6 +2,7 @@
 
 pub mod drift;
 mod field;
+mod finer;
 mod pairs;
 mod refine;
 pub mod snap;
@@ -111,7 +112,8 @@ pub fn find(
                 .into_iter()
                 .map(|candidate| refine::improved(&field, candidate))
                 .reduce(|a, b| if b.goodness > a.goodness { b } else { a });
-            if let Some(mut found) = found {
+            if let Some(found) = found {
+                let mut found = finer::finest(&field, found);
                 found.strength /= signal_share(&gamma).max(FAINTEST);
                 found.basis = scaled(found.basis, scale.map(f64::recip));
                 let stronger = |c: Candidate| {
