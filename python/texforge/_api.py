@@ -602,7 +602,7 @@ def _source_map_of(texture: Texture) -> SourceMap:
     if texture.params.get("subpixel") == "on":
         raise ParameterError(
             "`source_map` must be that of a texture made of copied pixels, got one made with "
-            "`subpixel` \"on\"; give the maps to `texforge.regular` (`maps`), or leave it off",
+            '`subpixel` "on"; give the maps to `texforge.regular` (`maps`), or leave it off',
             fields={"name": "source_map"},
         )
     if isinstance(texture, Tile):

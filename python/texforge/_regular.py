@@ -107,7 +107,8 @@ def regular(
         over the whole overlap, as in the paper.
     feather : int
         How far the two sides of a seam are faded into each other, in pixels, 0 to 64. With 0
-        every pixel is a copy of one of the photo's (unless `subpixel` is on). Linear seams are as wide as the border.
+        every pixel is a copy of one of the photo's (unless `subpixel` is on). Linear seams are as
+        wide as the border.
     flatten : float, optional
         Reach of the light flattening, as a fraction of the photo's shorter side, 0 (off) or 0.02
         to 1, as for `tile`: else pieces from dark and from bright parts would lie side by side. By

@@ -616,8 +616,8 @@ class Regular(Texture):
         The texture, with the data type and the number of channels of the photo.
     source_map : (H, W, 2) ndarray of int32
         Row and column of the photo's pixel that each pixel is a copy of, or with ``subpixel="on"``
-        lies nearest to. Where two are mixed, along seams, the one that there is more of. With ``feather=0, flatten=0`` and seams that are not
-        ``"linear"`` nothing is mixed, and
+        lies nearest to. Where two are mixed, along seams, the one that there is more of. With
+        ``feather=0, flatten=0`` and seams that are not ``"linear"`` nothing is mixed, and
         ``image == photo[source_map[..., 0], source_map[..., 1]]``.
     lattice : ((float, float), (float, float)) or None
         The lattice that was followed, found or given: two displacements in pixels of the photo, to

@@ -2,8 +2,11 @@
 
 use std::sync::LazyLock;
 
+use rayon::prelude::*;
+
 use crate::image::color::{SrgbTables, linear_from_srgb, srgb_from_linear};
-use crate::image::picture::Sample;
+use crate::image::material::MapKind;
+use crate::image::picture::{Encoding, Picture, Sample};
 
 /// Parts of a pixel. Places that are rounded to them are off by 0.005 pixels (root mean square).
 pub const PARTS: i64 = 64;
@@ -50,53 +53,76 @@ pub fn taps(place: i64) -> (i64, &'static [f64; 2 * REACH]) {
     (before + 1 - REACH as i64, &WEIGHTS[part as usize])
 }
 
-/// How the samples of a picture are mixed.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Reader {
+/// A picture that is read between its pixels.
+#[derive(Debug)]
+pub(super) struct Reader<'a, T> {
+    samples: &'a [T],
     /// Height, width and channels.
-    pub(super) size: (usize, usize, usize),
-    /// Whether samples are display-referred colours, and which channel is not.
-    pub(super) curved: bool,
-    pub(super) alpha: Option<usize>,
+    size: (usize, usize, usize),
+    alpha: Option<usize>,
+    /// The samples in linear light, if they are display-referred colours.
+    light: Option<Vec<f32>>,
 }
 
-impl Reader {
-    /// The picture of samples `v` at a place. Colours are mixed in linear light; beyond the edge the edge
-    /// goes on.
-    pub(super) fn read<T: Sample>(&self, out: &mut [T], v: &[T], at: [u32; 2], fraction: Fraction) {
-        let (h, w, c) = self.size;
+impl<'a, T: Sample> Reader<'a, T> {
+    /// `picture`, whose samples are these, and which `kind` says the numbers of.
+    pub(super) fn new(picture: &Picture, samples: &'a [T], kind: MapKind) -> Self {
+        let (c, alpha) = (picture.channels(), picture.alpha_channel());
         // Rounding hides the tables' errors; floats would show them.
         let tables = (T::SCALE > 1.0).then(SrgbTables::get);
-        let place = |k: usize| i64::from(at[k]) * PARTS + i64::from(fraction[k]);
-        let ((top, down), (left, across)) = (taps(place(0)), taps(place(1)));
-        let inside =
-            |first: i64, i: usize, n: usize| (first + i as i64).clamp(0, n as i64 - 1) as usize;
-        let rows: [usize; 2 * REACH] = std::array::from_fn(|i| inside(top, i, h) * w);
-        let columns: [usize; 2 * REACH] = std::array::from_fn(|i| inside(left, i, w));
+        let linear = |(i, v): (usize, &T)| match tables {
+            _ if Some(i % c) == alpha => v.to_unit() as f32,
+            Some(tables) => tables.linear(v.to_unit()) as f32,
+            None => linear_from_srgb(v.to_unit()) as f32,
+        };
+        let curved = picture.encoding == Encoding::Srgb && kind == MapKind::Color;
+        let light = curved.then(|| samples.par_iter().enumerate().map(linear).collect());
+        Self { samples, size: (picture.height(), picture.width(), c), alpha, light }
+    }
+
+    /// What is at a place. Colours are mixed in linear light; beyond the edge the edge goes on.
+    pub(super) fn read(&self, out: &mut [T], at: [u32; 2], fraction: Fraction) {
+        let Some(light) = &self.light else {
+            let put = |_, value| T::from_unit(value);
+            return self.mixed(out, at, fraction, |i| self.samples[i].to_unit(), put);
+        };
+        let tables = (T::SCALE > 1.0).then(SrgbTables::get);
+        let display = |k, value| {
+            T::from_unit(match tables {
+                _ if Some(k) == self.alpha => value,
+                Some(tables) => tables.display(value),
+                None => srgb_from_linear(value),
+            })
+        };
+        self.mixed(out, at, fraction, |i| f64::from(light[i]), display);
+    }
+
+    /// The same from `value(sample)` to `put(channel, mixture)`.
+    fn mixed(
+        &self,
+        out: &mut [T],
+        at: [u32; 2],
+        fraction: Fraction,
+        value: impl Fn(usize) -> f64,
+        put: impl Fn(usize, f64) -> T,
+    ) {
+        let (h, w, c) = self.size;
+        let along = |k: usize, n: usize| {
+            let (first, weights) = taps(i64::from(at[k]) * PARTS + i64::from(fraction[k]));
+            // At a whole pixel what lies beside it is not even read: it may be hidden.
+            let own = if fraction[k] == 0 { REACH - 1..REACH } else { 0..2 * REACH };
+            let inside = move |i: usize| (first + i as i64).clamp(0, n as i64 - 1) as usize;
+            own.map(move |i| (inside(i), weights[i]))
+        };
         for (k, out) in out.iter_mut().enumerate() {
-            let curved = self.curved && self.alpha != Some(k);
-            let (mut sum, mut least) = (0.0, f64::MAX);
-            for (row, down) in rows.iter().zip(down).filter(|(_, weight)| **weight != 0.0) {
-                let mut of_row = 0.0;
-                for (column, across) in columns.iter().zip(across).filter(|(_, w)| **w != 0.0) {
-                    let value = v[(row + column) * c + k].to_unit();
-                    let value = match tables {
-                        _ if !curved => value,
-                        Some(tables) => tables.linear(value),
-                        None => linear_from_srgb(value),
-                    };
-                    least = least.min(value);
-                    of_row += across * value;
-                }
-                sum += down * of_row;
-            }
+            let all = |y: usize| along(1, w).map(move |(x, across)| ((y * w + x) * c + k, across));
+            let of_row = |y: usize| all(y).map(|(i, across)| across * value(i)).sum::<f64>();
+            let mut sum: f64 = along(0, h).map(|(y, down)| down * of_row(y)).sum();
             // The kernel undershoots beside edges; less than no light or height there is not.
-            let sum = if least >= 0.0 { sum.max(0.0) } else { sum };
-            *out = T::from_unit(match tables {
-                _ if !curved => sum,
-                Some(tables) => tables.display(sum),
-                None => srgb_from_linear(sum),
-            });
+            if sum < 0.0 && along(0, h).all(|(y, _)| all(y).all(|(i, _)| value(i) >= 0.0)) {
+                sum = 0.0;
+            }
+            *out = put(k, sum);
         }
     }
 }
@@ -105,8 +131,7 @@ impl Reader {
 mod tests {
     use super::*;
     use crate::base::rng::Rng;
-    use crate::image::material::MapKind;
-    use crate::image::picture::{Encoding, Picture, Samples};
+    use crate::image::picture::Samples;
     use crate::image::sourcemap::SourceMap;
 
     fn sinc(t: f64) -> f64 {

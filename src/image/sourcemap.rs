@@ -6,7 +6,7 @@ use crate::base::error::{Error, Result};
 use crate::image::interpolate::{Fraction, PARTS, Reader};
 use crate::image::material::MapKind;
 use crate::image::normals::{renormalize, turn_normals};
-use crate::image::picture::{Encoding, Picture, Sample, Samples};
+use crate::image::picture::{Picture, Sample, Samples};
 use crate::image::symmetry::Symmetry;
 use crate::with_samples;
 
@@ -222,19 +222,17 @@ fn gathered<T: Sample>(
     let slices: Vec<&[T]> = maps.iter().map(|m| T::slice(m.samples()).unwrap_or(first)).collect();
     let same_size = |(m, &size): (&&Picture, &(usize, usize))| (m.height(), m.width()) == size;
     let same_size: Vec<bool> = maps.iter().zip(&source_map.sources).map(same_size).collect();
-    let reader = Reader {
-        size: (maps[0].height(), maps[0].width(), c),
-        curved: maps[0].encoding == Encoding::Srgb && kind == MapKind::Color,
-        alpha: maps[0].alpha_channel(),
-    };
+    // Fractions come with one photo only.
+    let reader = (!source_map.fractions.is_empty()).then(|| Reader::new(maps[0], slices[0], kind));
     let mut out = vec![T::from_unit(0.0); source_map.yx.len() * c];
     let pixels = out.par_chunks_exact_mut(c).zip(&source_map.yx).enumerate();
     pixels.for_each(|(i, (out, &[y, x]))| {
         let photo = usize::from(source_map.origin(i).photo);
         let (v, w) = (slices[photo], maps[photo].width());
         let fraction = source_map.fractions.get(i).copied().unwrap_or_default();
-        if same_size[photo] && fraction != [0, 0] {
-            reader.read(out, v, [y, x], fraction);
+        let between = reader.as_ref().filter(|_| fraction != [0, 0]);
+        if let Some(reader) = between.filter(|_| same_size[photo]) {
+            reader.read(out, [y, x], fraction);
         } else if same_size[photo] {
             let at = (y as usize * w + x as usize) * c;
             out.copy_from_slice(&v[at..at + c]);

@@ -1,5 +1,8 @@
 //! `regular` with pieces between pixels, on pictures that are known there.
 
+use std::process::Command;
+
+use assert_cmd::prelude::*;
 use texforge::base::params::OrAuto;
 use texforge::base::rng::Rng;
 use texforge::verb::regular::{Seam, Straighten, Subpixel, Tileable};
@@ -7,6 +10,8 @@ use texforge::{
     Ctx, Encoding, Guide, MapKind, Mask, Picture, Regular, RegularMaker, RegularParams, Samples,
     Size, regular,
 };
+
+use crate::support::{Folder, PROGRAM};
 
 /// A lattice of fractions of pixels, and one of whole ones.
 const FINE: [[f64; 2]; 2] = [[20.37, 0.21], [0.4, 17.63]];
@@ -175,4 +180,24 @@ fn same_bytes_for_any_threads_kernels_and_strips() {
         }
         assert_eq!(&Samples::U8(samples), whole.samples(), "{seam:?}");
     }
+}
+
+#[test]
+fn a_source_map_of_whole_pixels_is_refused() {
+    let folder = Folder::new();
+    let photo = grainy();
+    folder.rgb_from("wall.png", 160, 150, |x, y| {
+        [0, 1, 2].map(|k| (255.0 * photo.samples().unit((y * 160 + x) as usize * 4 + k)) as u8)
+    });
+    let run = |more: &[&str]| {
+        let args = ["regular", "wall.png", "--lattice", "20.37,0.21,0.4,17.63", "--subpixel", "on"];
+        let mut command = Command::new(PROGRAM);
+        command.args(args).args(more).current_dir(folder.at("")).output().expect("it runs")
+    };
+    run(&["-o", "a.png"]).assert().success();
+    let refused = run(&["-o", "b.png", "--save-source-map", "b.exr"]);
+    let message = String::from_utf8_lossy(&refused.stderr).into_owned();
+    refused.assert().code(2);
+    assert!(message.contains("`subpixel` on") && message.contains("`--map`"), "{message}");
+    assert!(folder.names().iter().all(|name| !name.starts_with('b')), "{:?}", folder.names());
 }
