@@ -67,7 +67,7 @@ fn off(texture: &Picture, basis: [[f64; 2]; 2]) -> f64 {
 #[test]
 fn the_pattern_goes_on_between_pixels() {
     let photo = picture(FINE, 1);
-    for (straighten, tolerance, gain) in [(Straighten::Off, 0, 20.0), (Straighten::On, 3, 4.0)] {
+    for (straighten, tolerance, gain) in [(Straighten::Off, 0, 15.0), (Straighten::On, 3, 4.0)] {
         let of = |subpixel| {
             let params = RegularParams { straighten, tolerance, ..params(FINE, subpixel) };
             off(&made(&photo, &params).picture, FINE)

@@ -284,7 +284,8 @@ def test_a_lattice_between_pixels_is_followed_there(tmp_path: Path) -> None:
         y, x = np.mgrid[:height, :width]
         across, down = x / 20.37, y / 17.63
         shape = np.sin(2 * np.pi * across) + np.cos(2 * np.pi * (down + across))
-        return (0.5 + 0.2 * shape).astype(np.float32)
+        values: npt.NDArray[Any] = (0.5 + 0.2 * shape).astype(np.float32)
+        return values
 
     options: dict[str, Any] = {
         "size": (150, 170),
