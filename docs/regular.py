@@ -4,8 +4,8 @@ For each photograph of MANIFEST.json that has a lattice measured by hand: a text
 size, and one that repeats. A row of a class's sheet shows the photograph, the first, the corner of
 the second where four copies meet, all at full size and cropped, and the second 3 x 3, made smaller.
 Prints a table in Markdown, failures included: is the lattice of the texture, detected again, still
-the photo's (off by at most half a pixel a period), how much of the photo occurs in the texture, and
-how long did it take.
+the photo's (off by at most half a pixel a period), or finer or coarser but in step with it, how
+much of the photo occurs in the texture, and how long did it take.
 """
 
 from __future__ import annotations
@@ -29,16 +29,21 @@ HEAD = """\
 | --- | --- | ---: | --- | ---: | ---: | ---: | ---: |"""
 
 
-def off(got: texforge.Lattice, texture: texforge.Regular) -> float:
-    """Return by how many pixels a detected lattice misses the texture's, in the worse vector.
+def off(got: texforge.Lattice, texture: texforge.Regular) -> str:
+    """Say by how many pixels a detected lattice misses the texture's, in the worse vector.
 
-    Infinite if it is another one: finer, coarser or aslant.
+    With how many cells of the one are a cell of the other, if it is finer or coarser: then what
+    repeats is still in step. ``inf`` if it is none of these.
     """
     wanted, found = np.array(texture.lattice_of_texture), np.array([got.v1, got.v2])
-    whole = np.rint(found @ np.linalg.inv(wanted))
-    if abs(abs(np.linalg.det(whole)) - 1) > 0.5:
-        return float("inf")
-    return float(np.linalg.norm(whole @ wanted - found, axis=1).max())
+    for fine, coarse, relation in ((wanted, found, "coarser"), (found, wanted, "finer")):
+        whole = np.rint(coarse @ np.linalg.inv(fine))
+        cells = round(abs(np.linalg.det(whole)))
+        misses = np.linalg.norm(whole @ fine - coarse, axis=1).max()
+        # In a lattice that is fine enough anything is.
+        if cells > 0 and misses < 0.1 * np.linalg.norm(fine, axis=1).min():
+            return f"{misses:.2f}" if cells == 1 else f"{misses:.2f}, {cells} x {relation}"
+    return "inf"
 
 
 def made(photo: texforge.Image, **options: Any) -> tuple[texforge.Regular, float]:
@@ -69,7 +74,7 @@ def row(entry: dict[str, Any], path: Path, out: Path, side: int) -> list[contact
     print(
         f"| {path.name} | {lattices.shown(v1)} {lattices.shown(v2)} | {how} | "
         f"{lattices.shown(again.v1)} {lattices.shown(again.v2)} {again.confidence:.2f} | "
-        f"{off(again, large):.2f} | {used:.0%} | {seconds:.1f} s | {tile_seconds:.1f} s |",
+        f"{off(again, large)} | {used:.0%} | {seconds:.1f} s | {tile_seconds:.1f} s |",
         flush=True,
     )
     for name, texture in (("large", large), ("tile", tile)):

@@ -599,6 +599,12 @@ def _source_map_of(texture: Texture) -> SourceMap:
             "'make-seamless' blends; choose another method",
             fields={"name": "source_map"},
         )
+    if texture.params.get("subpixel") == "on":
+        raise ParameterError(
+            "`source_map` must be that of a texture made of copied pixels, got one made with "
+            '`subpixel` "on"; give the maps to `texforge.regular` (`maps`), or leave it off',
+            fields={"name": "source_map"},
+        )
     if isinstance(texture, Tile):
         also = (texture.also_sizes, texture.origins)
         return SourceMap(texture.source_map, texture.photo_size, *also)

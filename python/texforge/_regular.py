@@ -22,6 +22,7 @@ from texforge._types import (
     RegularOptions,
     Seam,
     Straightening,
+    Subpixel,
     Tileable,
 )
 
@@ -42,6 +43,7 @@ def regular(
     border: int | None = None,
     candidates: int = 64,
     tolerance: int = 3,
+    subpixel: Subpixel = "off",
     matching: Matching = "color",
     deform: int = 0,
     seam: Seam = "graph",
@@ -89,6 +91,10 @@ def regular(
         How many pieces are tried for every gap, 1 to 65536.
     tolerance : int
         How far from its place on the lattice a piece for a gap may come from, in pixels, 0 to 64.
+    subpixel : {"off", "on"}
+        Whether pieces that the lattice puts between pixels are interpolated there, or moved to the
+        nearest pixel and copied. On, joints stay straighter and pixels become a little softer; it
+        makes no difference without a lattice.
     matching : {"color", "correlation"}
         By what a piece for a gap is chosen: squared differences of colour, or normalized
         cross-correlation, for which lines count more than brightness.
@@ -101,7 +107,8 @@ def regular(
         over the whole overlap, as in the paper.
     feather : int
         How far the two sides of a seam are faded into each other, in pixels, 0 to 64. With 0
-        every pixel is a copy of one of the photo's. Linear seams are as wide as the border.
+        every pixel is a copy of one of the photo's (unless `subpixel` is on). Linear seams are as
+        wide as the border.
     flatten : float, optional
         Reach of the light flattening, as a fraction of the photo's shorter side, 0 (off) or 0.02
         to 1, as for `tile`: else pieces from dark and from bright parts would lie side by side. By

@@ -53,6 +53,7 @@ __all__ = [
     "SourceMap",
     "Step",
     "Straightening",
+    "Subpixel",
     "Symmetries",
     "TextureCost",
     "Tile",
@@ -84,6 +85,8 @@ Tileable: TypeAlias = Literal["none"] | Literal["both"] | Literal["x"] | Literal
 """In which directions a near-regular texture repeats."""
 Straightening: TypeAlias = Literal["off"] | Literal["on"]
 """Whether cells that lie beside their place on the lattice are put into it."""
+Subpixel: TypeAlias = Literal["off"] | Literal["on"]
+"""Whether pieces that the lattice puts between pixels are interpolated there."""
 Matching: TypeAlias = Literal["color"] | Literal["correlation"]
 """By what a piece for a gap is chosen."""
 Seam: TypeAlias = Literal["graph"] | Literal["cut"] | Literal["linear"]
@@ -185,6 +188,7 @@ class RegularOptions(TypedDict, total=False):
     border: int | None
     candidates: int
     tolerance: int
+    subpixel: Subpixel
     matching: Matching
     deform: int
     seam: Seam
@@ -611,9 +615,9 @@ class Regular(Texture):
     image : (H, W) or (H, W, C) ndarray
         The texture, with the data type and the number of channels of the photo.
     source_map : (H, W, 2) ndarray of int32
-        Row and column of the photo's pixel that each pixel is a copy of. Where two are mixed, along
-        seams, the one that there is more of. With ``feather=0, flatten=0`` and seams that are not
-        ``"linear"`` nothing is mixed, and
+        Row and column of the photo's pixel that each pixel is a copy of, or with ``subpixel="on"``
+        lies nearest to. Where two are mixed, along seams, the one that there is more of. With
+        ``feather=0, flatten=0`` and seams that are not ``"linear"`` nothing is mixed, and
         ``image == photo[source_map[..., 0], source_map[..., 1]]``.
     lattice : ((float, float), (float, float)) or None
         The lattice that was followed, found or given: two displacements in pixels of the photo, to
@@ -651,7 +655,7 @@ class Regular(Texture):
 
         It copies, so where pixels are mixed along seams (`feather` above 0, or seams that are
         ``"linear"``) it has hard edges there. The `maps` of `texforge.regular` are mixed
-        likewise.
+        likewise. What was made with ``subpixel="on"`` is refused, as its pixels are no copies.
 
         Parameters
         ----------
@@ -669,6 +673,8 @@ class Regular(Texture):
         ------
         PictureError
             If the map has another aspect ratio than the photo.
+        ParameterError
+            If the texture was made with ``subpixel="on"``.
         """
         from texforge import _api
 

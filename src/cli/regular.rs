@@ -25,7 +25,7 @@ use crate::image::picture::Picture;
 use crate::signal::basis::Basis;
 use crate::verb::inputs::Inputs;
 use crate::verb::params::TileParams;
-use crate::verb::regular::{RegularMaker, RegularParams, RegularReport};
+use crate::verb::regular::{RegularMaker, RegularParams, RegularReport, Subpixel};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -128,6 +128,13 @@ pub(super) fn run(matches: &ArgMatches) -> Result<()> {
             return Err(Error::parameter(flag, expected, "`-o -`"));
         }
         request.maps.pick_up = false;
+    }
+    if let Some(path) =
+        request.source_map.as_ref().filter(|_| request.params.subpixel == Subpixel::On)
+    {
+        let expected =
+            "left out with `subpixel` on, as pixels are no copies then; give the maps with `--map`";
+        return Err(Error::parameter("save-source-map", expected, path.display()));
     }
     let (ctx, session) = Session::begin(matches)?;
     let (summary, line) = supervise(&session, move |session| work(session, &ctx, &request))?;

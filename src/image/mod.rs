@@ -2,6 +2,7 @@
 
 pub mod blend;
 pub mod color;
+pub mod interpolate;
 pub mod io;
 pub mod mask;
 pub mod material;

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use crate::base::error::{Error, Result};
+use crate::image::interpolate::{Fraction, PARTS, Reader};
 use crate::image::material::MapKind;
 use crate::image::normals::{renormalize, turn_normals};
 use crate::image::picture::{Picture, Sample, Samples};
@@ -28,6 +29,8 @@ pub struct SourceMap {
     yx: Vec<[u32; 2]>,
     /// One a pixel; empty if every pixel is of the only photo, as it lies.
     origins: Vec<Origin>,
+    /// How far beside its position each pixel is read; empty if all are copies.
+    fractions: Vec<Fraction>,
 }
 
 impl SourceMap {
@@ -65,7 +68,7 @@ impl SourceMap {
         if !one && origins.len() != yx.len() {
             return bad(format!("{} origins for {} positions", origins.len(), yx.len()));
         }
-        let map = Self { height, width, sources, yx, origins };
+        let map = Self { height, width, sources, yx, origins, fractions: Vec::new() };
         let source = |i: usize| map.sources.get(usize::from(map.origin(i).photo)).copied();
         let outside = |(i, &[y, x]): (usize, &[u32; 2])| {
             source(i).is_none_or(|(h, w)| y as usize >= h || x as usize >= w)
@@ -78,6 +81,24 @@ impl SourceMap {
             return bad(format!("position row {y}, column {x} lies outside its {w}x{h} source"));
         }
         Ok(map)
+    }
+
+    /// The same, with every pixel read so far beside its position: between pixels, where that is not
+    /// nought.
+    ///
+    /// # Errors
+    /// [`Error::BadPicture`] if there is not one fraction a pixel, or pixels have origins.
+    pub fn between(self, fractions: Vec<Fraction>) -> Result<Self> {
+        if fractions.len() != self.yx.len() || !self.origins.is_empty() {
+            let what = "source map".into();
+            let reason = format!(
+                "{} fractions for {} positions in one photo",
+                fractions.len(),
+                self.yx.len()
+            );
+            return Err(Error::BadPicture { what, reason });
+        }
+        Ok(Self { fractions, ..self })
     }
 
     /// Height of the output in pixels.
@@ -110,6 +131,11 @@ impl SourceMap {
         (!self.origins.is_empty()).then_some(&self.origins)
     }
 
+    /// How far beside its position each pixel is read, row by row; `None` if all are copies.
+    pub fn fractions(&self) -> Option<&[Fraction]> {
+        (!self.fractions.is_empty()).then_some(&self.fractions)
+    }
+
     /// The origin of output pixel `i`.
     #[inline]
     pub fn origin(&self, i: usize) -> Origin {
@@ -125,7 +151,8 @@ impl SourceMap {
     }
 
     /// Gathers maps, one of each photo, through the source map: output pixel (y, x) is the pixel at
-    /// `positions()[y * width + x]` of its photo's map, bit for bit.
+    /// `positions()[y * width + x]` of its photo's map, bit for bit; or, where that has a fraction, what
+    /// lies between the pixels around it, in linear light.
     ///
     /// A map of another size than its source (but the same shape) is read bilinearly at the
     /// corresponding places. Normals are mirrored and turned with the photo, and come out with unit
@@ -140,7 +167,7 @@ impl SourceMap {
         self.ensure_maps_fit(maps)?;
         let turned = self.origins.iter().any(|o| o.symmetry.swaps_axes());
         kind.ensure_turnable(turned)?;
-        let samples = with_samples!(maps[0].samples(), v => gathered(self, v, maps));
+        let samples = with_samples!(maps[0].samples(), v => gathered(self, v, maps, kind));
         let first = maps[0];
         let out = first.with_samples(self.height, self.width, first.channels(), samples)?;
         if !kind.is_normal() {
@@ -185,38 +212,50 @@ impl SourceMap {
 }
 
 /// The samples of every output pixel. `first` are those of the first map and say the type.
-fn gathered<T: Sample>(source_map: &SourceMap, first: &[T], maps: &[&Picture]) -> Samples {
+fn gathered<T: Sample>(
+    source_map: &SourceMap,
+    first: &[T],
+    maps: &[&Picture],
+    kind: MapKind,
+) -> Samples {
     let c = maps[0].channels();
     let slices: Vec<&[T]> = maps.iter().map(|m| T::slice(m.samples()).unwrap_or(first)).collect();
     let same_size = |(m, &size): (&&Picture, &(usize, usize))| (m.height(), m.width()) == size;
     let same_size: Vec<bool> = maps.iter().zip(&source_map.sources).map(same_size).collect();
+    // Fractions come with one photo only.
+    let reader = (!source_map.fractions.is_empty()).then(|| Reader::new(maps[0], slices[0], kind));
     let mut out = vec![T::from_unit(0.0); source_map.yx.len() * c];
     let pixels = out.par_chunks_exact_mut(c).zip(&source_map.yx).enumerate();
     pixels.for_each(|(i, (out, &[y, x]))| {
         let photo = usize::from(source_map.origin(i).photo);
         let (v, w) = (slices[photo], maps[photo].width());
-        if same_size[photo] {
+        let fraction = source_map.fractions.get(i).copied().unwrap_or_default();
+        let between = reader.as_ref().filter(|_| fraction != [0, 0]);
+        if let Some(reader) = between.filter(|_| same_size[photo]) {
+            reader.read(out, [y, x], fraction);
+        } else if same_size[photo] {
             let at = (y as usize * w + x as usize) * c;
             out.copy_from_slice(&v[at..at + c]);
         } else {
             let size = (maps[photo].height(), w, c);
-            read_bilinear(out, v, size, (y, x), source_map.sources[photo]);
+            let place = |p: u32, k: usize| f64::from(p) + f64::from(fraction[k]) / PARTS as f64;
+            read_bilinear(out, v, size, (place(y, 0), place(x, 1)), source_map.sources[photo]);
         }
     });
     T::wrap(out)
 }
 
-/// Reads a map at the place that corresponds to a pixel of its source.
+/// Reads a map at the place that corresponds to one of its source.
 fn read_bilinear<T: Sample>(
     out: &mut [T],
     v: &[T],
     (h, w, c): (usize, usize, usize),
-    (y, x): (u32, u32),
+    (y, x): (f64, f64),
     (sh, sw): (usize, usize),
 ) {
     // Pixel centres correspond: (p + 0.5) / source = (q + 0.5) / map.
-    let place = |p: u32, n: usize, source: usize| {
-        let q = ((p as f64 + 0.5) * n as f64 / source as f64 - 0.5).clamp(0.0, (n - 1) as f64);
+    let place = |p: f64, n: usize, source: usize| {
+        let q = ((p + 0.5) * n as f64 / source as f64 - 0.5).clamp(0.0, (n - 1) as f64);
         let low = q as usize;
         (low, (low + 1).min(n - 1), q - low as f64)
     };

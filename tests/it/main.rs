@@ -14,6 +14,7 @@ mod options;
 mod quality;
 mod redo;
 mod regular;
+mod regular_subpixel;
 mod search;
 #[path = "../support/mod.rs"]
 mod support;

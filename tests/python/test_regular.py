@@ -279,6 +279,44 @@ def test_maps_follow(wall: npt.NDArray[Any]) -> None:
     assert np.linalg.norm(mixed.maps["normal"] * 2 - 1, axis=2) == pytest.approx(1)
 
 
+def test_a_lattice_between_pixels_is_followed_there(tmp_path: Path) -> None:
+    def waves(height: int, width: int) -> npt.NDArray[Any]:
+        y, x = np.mgrid[:height, :width]
+        across, down = x / 20.37, y / 17.63
+        shape = np.sin(2 * np.pi * across) + np.cos(2 * np.pi * (down + across))
+        values: npt.NDArray[Any] = (0.5 + 0.2 * shape).astype(np.float32)
+        return values
+
+    options: dict[str, Any] = {
+        "size": (150, 170),
+        "lattice": ((20.37, 0), (0, 17.63)),
+        "straighten": "off",
+        "tolerance": 0,
+        "encoding": "linear",
+        **COPIED,
+    }
+    photo, wanted = waves(130, 140), waves(150, 170)
+    copied = texforge.regular(photo, **options)
+    between = texforge.regular(photo, **options, subpixel="on", maps={"height": photo})
+    off, near = (np.abs(t.image - wanted).max() for t in (copied, between))
+    assert near < 0.01 < 0.05 < off
+    assert np.array_equal(between.maps["height"], between.image)
+    again = texforge.regular(photo, **between.params, seed=0, encoding="linear")
+    assert np.array_equal(again.image, between.image)
+    # The file has the same bytes; a source map of whole pixels cannot say where they are.
+    path = tmp_path / "between.exr"
+    texforge.regular_to_file(photo, path, **options, subpixel="on")
+    assert np.array_equal(texforge.read_image(path), between.image)
+    assert np.array_equal(copied.apply(photo), copied.image)
+    for refused in (
+        lambda: between.apply(photo),
+        lambda: texforge.apply(between, photo),
+        lambda: between.save_source_map(tmp_path / "map.exr"),
+    ):
+        with pytest.raises(texforge.ParameterError, match="`subpixel`"):
+            refused()
+
+
 def test_no_masked_pixel_is_used(wall: npt.NDArray[Any]) -> None:
     mask = np.ones((96, 112), bool)
     mask[:20, :20] = False
@@ -391,6 +429,7 @@ BAD: dict[str, dict[str, Any]] = {
     "candidates": {"candidates": 0},
     "candidates too many": {"candidates": 65537},
     "tolerance": {"tolerance": 65},
+    "subpixel": {"subpixel": True},
     "matching": {"matching": "colour"},
     "deform": {"deform": 9},
     "seam": {"seam": "none"},

@@ -51,6 +51,7 @@ def test_a_near_regular_texture(tmp_path: Path) -> None:
         assert_type(texture.apply(photo), npt.NDArray[Any])
         assert_type(texforge.apply(texture, photo), npt.NDArray[Any])
     texforge.regular(photo, lattice="none", seam="cut", maps={"height": photo}, straighten="off")
+    texforge.regular(photo, lattice=((20, 0), (0, 16)), subpixel="on")
     file = texforge.regular_to_file(photo, tmp_path / "a.png", lattice="none", size=(32, 40))
     assert_type(file, texforge.RegularFile)
     assert_type(file.maps, dict[str, Path])

@@ -50,12 +50,22 @@ pub fn write_source_map(path: &Path, map: &SourceMap, force: bool) -> Result<()>
 /// ([`Symmetry::code`]), and the sizes of all photos.
 ///
 /// # Errors
-/// [`Error::Format`] if `path`, where the bytes are to go, does not end in `.exr`.
+/// [`Error::Format`] if `path`, where the bytes are to go, does not end in `.exr`; [`Error::BadPicture`]
+/// for a map with places between pixels, which the file does not hold.
 pub fn encode_source_map(map: &SourceMap, path: &Path) -> Result<Vec<u8>> {
     if Format::from_extension(path) != Some(Format::Exr) {
         return Err(Error::Format {
             path: path.to_owned(),
             reason: "a source map is written as EXR only; use a name that ends in .exr".into(),
+        });
+    }
+    if map.fractions().is_some() {
+        return Err(Error::BadPicture {
+            what: "source map".into(),
+            reason:
+                "it has places between pixels, and the file holds whole ones only; make the maps \
+                     together with the picture"
+                    .into(),
         });
     }
     let internal = |message: String| Error::Internal { message };
@@ -198,6 +208,10 @@ mod tests {
         let map = SourceMap::new((1, 2), (3, 4), vec![[2, 3], [0, 0]]).expect("map");
         let error = write_source_map(&dir.path().join("map.png"), &map, false);
         assert_eq!(error.expect_err("extension").kind(), ErrorKind::Format);
+
+        let between = map.between(vec![[0, 9], [0, 0]]).expect("one a pixel");
+        let error = write_source_map(&path, &between, false).expect_err("fractions");
+        assert!(error.to_string().contains("between pixels"), "{error}");
 
         let x = || FlatSamples::U32(vec![3, 0]);
         let y = || FlatSamples::U32(vec![2, 0]);

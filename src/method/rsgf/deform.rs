@@ -1,5 +1,6 @@
 //! Gap deformation: a patch is bent by a few pixels so that lines meet those of its neighbours.
 
+use crate::image::interpolate::{PARTS, nearest};
 use crate::method::rsgf::grid::{Lenses, Side};
 use crate::method::rsgf::{Place, pixels};
 use crate::search::patch::MatchImage;
@@ -13,7 +14,10 @@ const SPACING: usize = 8;
 const COST: f64 = 6.0;
 const BEND: f64 = 32.0;
 
-/// A displacement: rows, columns.
+/// A pixel, in what places are counted in.
+const PIXEL: i32 = PARTS as i32;
+
+/// A displacement in pixels: rows, columns.
 type Shift = [i32; 2];
 
 /// The places of the gap's patch at all pixels of its window, moved by at most `most` rows and columns
@@ -28,7 +32,8 @@ pub(super) fn bent(
     old: &[Place],
     most: usize,
 ) -> Vec<Place> {
-    let straight = |(y, x): (usize, usize)| [corner[0] + y as i32, corner[1] + x as i32];
+    let straight =
+        |(y, x): (usize, usize)| [corner[0] + y as i32 * PIXEL, corner[1] + x as i32 * PIXEL];
     if most == 0 {
         return pixels(lenses.window()).map(straight).collect();
     }
@@ -64,7 +69,7 @@ pub(super) fn bent(
         }
         let [y, x] = straight((y, x));
         let limit = |v: f64| (v.round() as i32).clamp(-(most as i32), most as i32);
-        [y + limit(sum[0]), x + limit(sum[1])]
+        [y + limit(sum[0]) * PIXEL, x + limit(sum[1]) * PIXEL]
     };
     pixels(lenses.window()).map(bend).collect()
 }
@@ -95,9 +100,13 @@ fn along_side(
             }
         }
     }
-    let pixel = |[y, x]: Place| image.pixel(y as usize, x as usize);
+    let pixel = |place: Place| {
+        let [y, x] = place.map(|v| nearest(v.into()) as usize);
+        image.pixel(y, x)
+    };
     let squared = |(y, x): (usize, usize), [dy, dx]: Shift| -> u32 {
-        let a = pixel([corner[0] + y as i32 + dy, corner[1] + x as i32 + dx]);
+        let (y_moved, x_moved) = (y as i32 + dy, x as i32 + dx);
+        let a = pixel([corner[0] + y_moved * PIXEL, corner[1] + x_moved * PIXEL]);
         let b = pixel(old[y * stride + x]);
         a.iter().zip(b).map(|(&a, b)| u32::from(a.abs_diff(b)).pow(2)).sum()
     };
@@ -142,6 +151,8 @@ mod tests {
     use super::*;
     use crate::base::rng::Rng;
 
+    const CORNER: Place = [14 * PIXEL, 16 * PIXEL];
+
     /// Noise, and what lies around a gap: the same noise, `off` elsewhere.
     fn example(off: Shift) -> (MatchImage, Lenses, Vec<Place>) {
         let mut image = MatchImage::new(64, 64);
@@ -153,7 +164,7 @@ mod tests {
         });
         let lenses = Lenses { size: (16, 24), border: 6 };
         let old = pixels(lenses.window())
-            .map(|(y, x)| [14 + y as i32 + off[0], 16 + x as i32 + off[1]])
+            .map(|(y, x)| [14 + y as i32 + off[0], 16 + x as i32 + off[1]].map(|v| v * PIXEL))
             .collect();
         (image, lenses, old)
     }
@@ -170,7 +181,7 @@ mod tests {
                     continue;
                 }
                 let a = image.pixel((14 + y as i32 + dy) as usize, (16 + x as i32 + dx) as usize);
-                let [oy, ox] = old[y * 36 + x];
+                let [oy, ox] = old[y * 36 + x].map(|v| v / PIXEL);
                 let b = image.pixel(oy as usize, ox as usize);
                 squares += (0..4).map(|k| u32::from(a[k].abs_diff(b[k])).pow(2)).sum::<u32>();
                 n += 1;
@@ -186,7 +197,7 @@ mod tests {
     fn no_sequence_of_displacements_is_better() {
         for off in [[0, 0], [1, 0], [0, -1], [1, 1]] {
             let (image, lenses, old) = example(off);
-            let found = along_side(&image, &lenses, Side::Top, [14, 16], &old, 1);
+            let found = along_side(&image, &lenses, Side::Top, CORNER, &old, 1);
             let one = |i: usize| [(i / 3) as i32 - 1, (i % 3) as i32 - 1];
             let all = (0..9 * 9 * 9).map(|i| [one(i / 81), one(i / 9 % 9), one(i % 9)]);
             let least = all.map(|s| cost(&image, &lenses, &old, &s)).fold(f64::MAX, f64::min);
@@ -203,13 +214,17 @@ mod tests {
     #[test]
     fn a_patch_is_bent_at_its_sides_and_not_in_the_middle() {
         let (image, lenses, old) = example([0, -1]);
-        let straight = bent(&image, &lenses, [14, 16], &old, 0);
-        let bent = bent(&image, &lenses, [14, 16], &old, 2);
+        let straight = bent(&image, &lenses, CORNER, &old, 0);
+        let bent = bent(&image, &lenses, CORNER, &old, 2);
         let moved = |y: usize, x: usize| {
             let i = y * 36 + x;
-            [bent[i][0] - straight[i][0], bent[i][1] - straight[i][1]]
+            [bent[i][0] - straight[i][0], bent[i][1] - straight[i][1]].map(|v| v / PIXEL)
         };
         assert_eq!((moved(14, 18), moved(6, 18), moved(0, 0)), ([0, 0], [0, -1], [0, 0]));
-        assert!(bent.iter().zip(&straight).all(|(a, b)| a[0] == b[0] && (a[1] - b[1]).abs() <= 2));
+        assert!(
+            bent.iter()
+                .zip(&straight)
+                .all(|(a, b)| a[0] == b[0] && (a[1] - b[1]).abs() <= 2 * PIXEL)
+        );
     }
 }

@@ -3,6 +3,7 @@
 use crate::analyze::lattice::drift::Drift;
 use crate::base::ctx::Simd;
 use crate::image::color::ColorModel;
+use crate::image::interpolate::{REACH, fraction, nearest};
 use crate::image::mask::Mask;
 use crate::image::picture::Picture;
 use crate::method::rsgf::places::Offset;
@@ -63,16 +64,18 @@ impl Exemplar {
         &self.drift
     }
 
-    /// Whether a window with this top left corner, and `margin` around it, can be copied.
+    /// Whether a window with this top left corner, and `margin` around it, can be copied; between pixels
+    /// with those that it is made of.
     pub(super) fn fits(
         &self,
-        [y, x]: Offset,
+        place: Offset,
         (height, width): (usize, usize),
         margin: usize,
     ) -> bool {
-        let (h, w, m) = (self.image.height() as i64, self.image.width() as i64, margin as i64);
-        let (y, x) = (y - m, x - m);
-        let (height, width) = (height + 2 * margin, width + 2 * margin);
+        let (h, w) = (self.image.height() as i64, self.image.width() as i64);
+        let [my, mx] = place.map(|v| margin + if fraction(v) == 0 { 0 } else { REACH });
+        let (y, x) = (nearest(place[0]) - my as i64, nearest(place[1]) - mx as i64);
+        let (height, width) = (height + 2 * my, width + 2 * mx);
         if y < 0 || x < 0 || y + height as i64 > h || x + width as i64 > w {
             return false;
         }

@@ -1,6 +1,7 @@
 //! Gap filling: the patch whose frame agrees best with what surrounds the gap.
 
 use crate::base::ctx::Simd;
+use crate::image::interpolate::{PARTS, nearest as pixel};
 use crate::method::rsgf::Matching;
 use crate::method::rsgf::grid::{Lenses, Side};
 use crate::method::rsgf::places::Offset;
@@ -47,7 +48,8 @@ impl Frame {
 
 /// The place of the patch whose frame is most like the one around the gap: of `places` the best few,
 /// each moved by at most `tolerance` rows and columns. Places are the window's top left corner in
-/// `source`; moved ones that do not fit are skipped. Of equally good ones the first. `None` without any
+/// `source`, compared at the nearest pixel (what is made between pixels is smoother, and noise would agree
+/// with it better); moved ones that do not fit are skipped. Of equally good ones the first. `None` without any
 /// place.
 pub(super) fn nearest(
     (simd, matching): (Simd, Matching),
@@ -57,9 +59,12 @@ pub(super) fn nearest(
     tolerance: usize,
     fits: impl Fn(Offset) -> bool,
 ) -> Option<Offset> {
-    let costs = |places: &[Offset], cut_off: bool| match matching {
-        Matching::Color => with_kernel(simd, 1, Differences { source, frame, places, cut_off }),
-        Matching::Correlation => with_kernel(simd, 1, Correlations { source, frame, places }),
+    let costs = |places: &[Offset], cut_off: bool| {
+        let places: &[Offset] = &places.iter().map(|place| place.map(pixel)).collect::<Vec<_>>();
+        match matching {
+            Matching::Color => with_kernel(simd, 1, Differences { source, frame, places, cut_off }),
+            Matching::Correlation => with_kernel(simd, 1, Correlations { source, frame, places }),
+        }
     };
     let all = costs(places, false);
     let mut order: Vec<usize> = (0..places.len()).collect();
@@ -67,7 +72,8 @@ pub(super) fn nearest(
     let t = tolerance as i64;
     let closer = order.iter().take(CLOSER).flat_map(|&i| {
         let [y, x] = places[i];
-        let moved = (-t..=t).flat_map(move |dy| (-t..=t).map(move |dx| [y + dy, x + dx]));
+        let moved =
+            (-t..=t).flat_map(move |dy| (-t..=t).map(move |dx| [y + dy * PARTS, x + dx * PARTS]));
         // Itself before those around it: a good one early saves most of the others.
         std::iter::once([y, x]).chain(moved)
     });
@@ -234,11 +240,16 @@ mod tests {
     #[test]
     fn the_copied_place_is_found_within_the_tolerance() {
         let (source, _, frame) = example(7);
-        let places = [[2, 3], [15, 15], [30, 30]];
-        let fits = |[y, x]: Offset| y >= 0 && x >= 0 && y + 15 <= 48 && x + 17 <= 52;
+        let places = [[2, 3], [15, 15], [30, 30]].map(|place| place.map(|v: i64| v * PARTS));
+        let fits = |place: Offset| {
+            let [y, x] = place.map(pixel);
+            y >= 0 && x >= 0 && y + 15 <= 48 && x + 17 <= 52
+        };
         for matching in [Matching::Color, Matching::Correlation] {
             let find = |tolerance| {
-                nearest((Simd::default(), matching), &source, &frame, &places, tolerance, fits)
+                let how = (Simd::default(), matching);
+                nearest(how, &source, &frame, &places, tolerance, fits)
+                    .map(|place| place.map(pixel))
             };
             assert_eq!(find(2), Some([13, 17]), "{matching:?}");
             assert_ne!(find(1), Some([13, 17]), "{matching:?}: out of reach");

@@ -8,6 +8,7 @@ mod grid;
 mod paint;
 mod places;
 mod seam;
+mod subpixel;
 
 use std::collections::BTreeMap;
 
@@ -16,6 +17,7 @@ use rayon::prelude::*;
 use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
 use crate::base::rng::Rng;
+use crate::image::interpolate::{PARTS, nearest};
 use crate::search::patchmatch::Wrap;
 use crate::signal::basis::Basis;
 pub use exemplar::Exemplar;
@@ -61,6 +63,8 @@ pub struct Plan {
     pub candidates: usize,
     /// How far from its place on the lattice a gap's patch may lie.
     pub tolerance: usize,
+    /// Whether pieces lie where the lattice says, between pixels, or at the nearest ones.
+    pub subpixel: bool,
     /// By what it is chosen.
     pub matching: Matching,
     /// How far it may be bent to meet its neighbours.
@@ -71,7 +75,7 @@ pub struct Plan {
     pub feather: usize,
 }
 
-/// A place of the photo: row, column.
+/// A place of the photo in [`PARTS`]: row, column. Whole pixels but for [`Plan::subpixel`].
 type Place = [i32; 2];
 
 /// A filled gap: of every pixel of its window, row by row, what of the photo it shows and how much of
@@ -102,7 +106,7 @@ impl<'a> Mosaic<'a> {
         Self {
             exemplar,
             plan,
-            places: Places::new(plan.lattices, exemplar.drift.clone(), size),
+            places: Places::new(plan.lattices, exemplar.drift.clone(), size, plan.subpixel),
             rows: Axis::new(plan.size.0, plan.block, plan.wrap.y),
             columns: Axis::new(plan.size.1, plan.block, plan.wrap.x),
         }
@@ -139,11 +143,16 @@ impl<'a> Mosaic<'a> {
         (y as f64 + height as f64 / 2.0, x as f64 + width as f64 / 2.0)
     }
 
-    /// The window's corner in the photo under an offset, in the output under none.
-    fn window_at(&self, block: Block, offset: Offset) -> Offset {
-        let [y, x] = self.corner(block);
+    /// The window's corner in the output.
+    fn window(&self, block: Block) -> [i64; 2] {
         let border = self.lenses(block).border as i64;
-        [y + offset[0] - border, x + offset[1] - border]
+        self.corner(block).map(|v| v - border)
+    }
+
+    /// The window's corner in the photo under an offset.
+    fn window_at(&self, block: Block, offset: Offset) -> Offset {
+        let [y, x] = self.window(block);
+        [y * PARTS + offset[0], x * PARTS + offset[1]]
     }
 
     /// Whether a patch of a block can be copied from there.
@@ -154,7 +163,7 @@ impl<'a> Mosaic<'a> {
     /// What a block's offset is for the same block one round away.
     fn moved(&self, from: Block, to: Block, [y, x]: Offset) -> Offset {
         let (a, b) = (self.corner(from), self.corner(to));
-        [y + a[0] - b[0], x + a[1] - b[1]]
+        [y + (a[0] - b[0]) * PARTS, x + (a[1] - b[1]) * PARTS]
     }
 
     fn nowhere(&self, block: Block) -> Error {
@@ -193,7 +202,7 @@ impl<'a> Mosaic<'a> {
         let corners = self.around(ctx, block)?.map(|o| self.window_at(block, o));
         let frame = Frame::new(&lenses, |side, (y, x)| {
             let [wy, wx] = corners[side as usize];
-            image.pixel((wy + y as i64) as usize, (wx + x as i64) as usize)
+            image.pixel((nearest(wy) + y as i64) as usize, (nearest(wx) + x as i64) as usize)
         });
         let mut rng = rng(ctx, GAP_STAGE, block);
         let (candidates, bend) = (self.plan.candidates, self.plan.deform);
@@ -201,12 +210,16 @@ impl<'a> Mosaic<'a> {
         let places = self.places.several(&mut rng, self.middle(block), candidates, fits);
         let places: Vec<Offset> = places.iter().map(|&o| self.window_at(block, o)).collect();
         let how = (ctx.simd, self.plan.matching);
-        let nearest = gap::nearest(how, image, &frame, &places, self.plan.tolerance, |place| {
+        let found = gap::nearest(how, image, &frame, &places, self.plan.tolerance, |place| {
             self.exemplar.fits(place, window, bend)
         });
-        let [y, x] = nearest.ok_or_else(|| self.nowhere(block))?;
+        let mut found = found.ok_or_else(|| self.nowhere(block))?;
+        if self.plan.subpixel && self.plan.tolerance > 0 {
+            let refined = subpixel::refined(image, &lenses, &corners, found);
+            found = if self.exemplar.fits(refined, window, bend) { refined } else { found };
+        }
         let [wy, wx] = self.window_at(block, [0, 0]);
-        Ok([y - wy, x - wx])
+        Ok([found[0] - wy, found[1] - wx])
     }
 
     /// The gaps that reach into these rows of blocks, and those that these have to know. Beyond a border
@@ -252,7 +265,7 @@ impl<'a> Mosaic<'a> {
         let lenses = self.lenses(block);
         let window = lenses.window();
         let around = self.around(ctx, block)?;
-        let [wy, wx] = self.window_at(block, [0, 0]);
+        let [wy, wx] = self.window(block);
         let beyond = |i: usize, n: usize| match i.checked_sub(lenses.border) {
             None => -1,
             Some(i) => i64::from(i >= n),
@@ -274,13 +287,13 @@ impl<'a> Mosaic<'a> {
                 }
             };
             let [dy, dx] = around[side as usize];
-            [(oy + dy) as i32, (ox + dx) as i32]
+            [(oy * PARTS + dy) as i32, (ox * PARTS + dx) as i32]
         };
         let mut old: Vec<Place> = pixels(window).map(place).collect();
         for corner in [[-1, -1], [-1, 1], [1, -1], [1, 1]] {
             let there = [block[0] + corner[0], block[1] + corner[1]];
             let Some(gap) = before.get(&there) else { continue };
-            let [gy, gx] = self.window_at(there, [0, 0]);
+            let [gy, gx] = self.window(there);
             let size = self.lenses(there).window();
             let all = pixels(size).zip(gap.places.iter().zip(&gap.shares));
             for ((y, x), (&place, _)) in all.filter(|(_, (_, share))| **share >= 128) {

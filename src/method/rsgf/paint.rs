@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use crate::base::ctx::Ctx;
 use crate::base::error::Result;
+use crate::image::interpolate::{Fraction, PARTS, fraction, nearest};
 use crate::method::rsgf::grid::{Block, is_sample, nearest_side};
 use crate::method::rsgf::{Filled, Mosaic, Seam};
 
@@ -14,9 +15,13 @@ pub struct Strip {
     pub first: usize,
     /// The photo's row and column of every pixel, row by row.
     pub from: Vec<[u32; 2]>,
+    /// How far beside it the pixel lies. Empty if nothing does.
+    pub beside: Vec<Fraction>,
     /// What each pixel is mixed with: the photo's row and column, and how much of it in 255ths. Empty
     /// if nothing is mixed.
     pub mixed: Vec<([u32; 2], u8)>,
+    /// How far beside that this lies.
+    pub mixed_beside: Vec<Fraction>,
 }
 
 impl Mosaic<'_> {
@@ -52,10 +57,10 @@ impl Mosaic<'_> {
                 self.paint_samples(ctx, [r, c], &rows, from)?;
             }
             for (place, mixed) in from.iter().zip(mixed.iter_mut()) {
-                *mixed = (*place, 0);
+                *mixed = unmixed(*place);
             }
             for (block, gap) in filled.iter().filter(|([row, _], _)| row.abs_diff(r) <= 1) {
-                let [wy, wx] = self.window_at(*block, [0, 0]);
+                let [wy, wx] = self.window(*block);
                 let window = self.lenses(*block).window();
                 for (y, line) in (wy..).zip(0..window.0).filter(|(y, _)| rows.contains(y)) {
                     let columns = wx.max(0)..(wx + window.1 as i64).min(width as i64);
@@ -69,9 +74,8 @@ impl Mosaic<'_> {
                         let (old, new) = (from[k], gap.places[i].map(|v| v as u32));
                         from[k] = if share >= 128 { new } else { old };
                         if mixes {
-                            // Of nothing it is not even known where it would come from.
                             mixed[k] = match share {
-                                255 => (new, 0),
+                                255 => unmixed(new),
                                 128..255 => (old, 255 - share),
                                 _ => (new, share),
                             };
@@ -81,7 +85,21 @@ impl Mosaic<'_> {
             }
             ctx.step(0)
         })?;
-        Ok(Strip { first: begin, from, mixed })
+        let split = |place: &mut [u32; 2]| {
+            let beside = place.map(|v| fraction(v.into()));
+            *place = place.map(|v| nearest(v.into()) as u32);
+            beside
+        };
+        let whole = from.par_iter_mut().map(split);
+        let whole_mixed = mixed.par_iter_mut().map(|(place, _)| split(place));
+        let (beside, mixed_beside) = if self.plan.subpixel {
+            (whole.collect(), whole_mixed.collect())
+        } else {
+            whole.for_each(drop);
+            whole_mixed.for_each(drop);
+            (Vec::new(), Vec::new())
+        };
+        Ok(Strip { first: begin, from, beside, mixed, mixed_beside })
     }
 
     /// A block of one sample, or a gap's of the four around it as far as they reach.
@@ -102,9 +120,15 @@ impl Mosaic<'_> {
                 let at = ((y - y0) as usize, (x - x0) as usize);
                 let [oy, ox] = sample.unwrap_or_else(|| around[nearest_side(size, at) as usize]);
                 from[(y - rows.start) as usize * width + x as usize] =
-                    [(y + oy) as u32, (x + ox) as u32];
+                    [(y * PARTS + oy) as u32, (x * PARTS + ox) as u32];
             }
         }
         Ok(())
     }
+}
+
+/// A place mixed with nothing: it is not even known where that would come from. A whole pixel, as such are
+/// the quickest to read.
+fn unmixed(place: [u32; 2]) -> ([u32; 2], u8) {
+    (place.map(|v| (nearest(v.into()) * PARTS) as u32), 0)
 }

@@ -2,12 +2,13 @@
 
 use crate::analyze::lattice::drift::Drift;
 use crate::base::rng::Rng;
+use crate::image::interpolate::PARTS;
 use crate::signal::basis::{Basis, coefficients, combined};
 
 /// How often a place is drawn before all are looked through.
 const TRIES: u32 = 64;
 
-/// From a pixel of the output to the pixel of the photo that is shown there: rows, columns.
+/// From a pixel of the output to the place of the photo that is shown there, in [`PARTS`]: rows, columns.
 pub(super) type Offset = [i64; 2];
 
 /// A lattice in the photo and the same lattice in the output, where it may be a little stretched.
@@ -19,6 +20,8 @@ pub(super) struct Places {
     drift: Drift,
     /// The cells that reach into the photo, and some more: the first coefficients, how many.
     cells: [(i64, usize); 2],
+    /// Whether places lie between pixels.
+    subpixel: bool,
 }
 
 impl Places {
@@ -27,6 +30,7 @@ impl Places {
         [source, output]: [Basis; 2],
         drift: Drift,
         (height, width): (usize, usize),
+        subpixel: bool,
     ) -> Self {
         let (w, h) = (width as f64, height as f64);
         let corners = [[0.0, 0.0], [w, 0.0], [0.0, h], [w, h]].map(|c| coefficients(source, c));
@@ -35,7 +39,7 @@ impl Places {
             let high = corners.iter().map(|c| c[k]).fold(f64::MIN, f64::max).ceil() + 1.0;
             (low as i64, (high - low) as usize)
         });
-        Self { source, output, drift, cells }
+        Self { source, output, drift, cells, subpixel }
     }
 
     fn len(&self) -> usize {
@@ -50,7 +54,9 @@ impl Places {
         let b = b - b.floor() + (first_b + (i % n_b) as i64) as f64;
         let ([sx, sy], [dx, dy]) = (combined(self.source, a, b), self.drift.at(a, b));
         let (sx, sy) = (sx + dx, sy + dy);
-        [(sy - y).round() as i64, (sx - x).round() as i64]
+        [sy - y, sx - x].map(|v| {
+            if self.subpixel { (v * PARTS as f64).round() as i64 } else { v.round() as i64 * PARTS }
+        })
     }
 
     /// All places for the output's pixel `at` that fit.

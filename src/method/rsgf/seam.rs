@@ -1,5 +1,6 @@
 //! How a gap's patch and what surrounds it are joined.
 
+use crate::image::interpolate::{PARTS, nearest};
 use crate::method::rsgf::grid::{Lenses, Side};
 use crate::method::rsgf::{Place, pixels};
 use crate::search::cut::{self, Division};
@@ -91,7 +92,7 @@ pub(super) fn cut_by_graph(
                 if ends {
                     continue;
                 }
-                let delta = [i32::from(below), i32::from(!below)];
+                let delta = [i32::from(below), i32::from(!below)].map(|v| v * PARTS as i32);
                 let beyond = [old[p][0] + delta[0], old[p][1] + delta[1]];
                 let costs = if beyond == old[q] {
                     let both = steps[p] + steps[q];
@@ -142,9 +143,10 @@ pub(super) fn feathered(lenses: &Lenses, shares: &[u8], reach: usize) -> Shares 
     soft.map(|(at, share)| if lenses.is_core(at) { 255 } else { share as u8 }).collect()
 }
 
-/// The colour at a place of the photo, if it is in it.
-fn color(image: &MatchImage, [y, x]: Place) -> Option<[u8; 4]> {
-    let (y, x) = (usize::try_from(y).ok()?, usize::try_from(x).ok()?);
+/// The colour of the pixel nearest to a place of the photo, if it is in it.
+fn color(image: &MatchImage, place: Place) -> Option<[u8; 4]> {
+    let [y, x] = place.map(|v| usize::try_from(nearest(v.into())).ok());
+    let (y, x) = (y?, x?);
     (y < image.height() && x < image.width()).then(|| image.pixel(y, x))
 }
 

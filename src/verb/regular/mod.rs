@@ -20,7 +20,7 @@ use crate::method::rsgf::{self, Exemplar, Mosaic, Plan};
 use crate::search::patchmatch::Wrap;
 use crate::signal::basis::Basis;
 use crate::verb::params::Size;
-pub use params::{Guide, Matching, RegularParams, Seam, Straighten, Tileable};
+pub use params::{Guide, Matching, RegularParams, Seam, Straighten, Subpixel, Tileable};
 use resolve::{LEAST_BLOCK, blocks, flatten_share, flattened, lattice, sized, usable};
 
 /// How a texture was made.
@@ -181,6 +181,7 @@ impl<'a> RegularMaker<'a> {
             candidates: params.candidates,
             // Where everything is allowed there is nothing to be off.
             tolerance: if lattice.is_some() { params.tolerance } else { 0 },
+            subpixel: params.subpixel == Subpixel::On,
             matching: match params.matching {
                 Matching::Color => rsgf::Matching::Color,
                 Matching::Correlation => rsgf::Matching::Correlation,
@@ -299,7 +300,7 @@ impl<'a> RegularMaker<'a> {
         let (width, height) = self.size();
         let tall = rows.saturating_mul(self.plan.block).min(height) + 4 * self.plan.block;
         // Places and what they are mixed with; a picture, its twin and the mixture.
-        let each = 40 + PIECES + 3 * bytes_per_pixel(self.photo) + more;
+        let each = 44 + PIECES + 3 * bytes_per_pixel(self.photo) + more;
         let need = (width as u64).checked_mul(tall as u64).and_then(|n| n.checked_mul(each));
         ensure_available(&format!("a texture of {width}x{height}, {tall} rows at a time,"), need)?;
         let mosaic = Mosaic::new(&self.exemplar, &self.plan);
@@ -311,16 +312,20 @@ impl<'a> RegularMaker<'a> {
         let ctx = ctx.clone();
         Ok(strips.into_iter().map(move |blocks| {
             ctx.install(|| {
-                let rsgf::Strip { first, from, mixed } = mosaic.strip(&ctx, blocks)?;
+                let rsgf::Strip { first, from, beside, mixed, mixed_beside } =
+                    mosaic.strip(&ctx, blocks)?;
                 let size = (from.len() / width, width);
-                let source_map = SourceMap::new(size, photo, from)?;
+                let source_map = |from, beside: Vec<_>| {
+                    let map = SourceMap::new(size, photo, from)?;
+                    if beside.is_empty() { Ok(map) } else { map.between(beside) }
+                };
                 let mixed = if mixed.is_empty() {
                     None
                 } else {
                     let (others, shares) = mixed.into_iter().unzip();
-                    Some((SourceMap::new(size, photo, others)?, shares))
+                    Some((source_map(others, mixed_beside)?, shares))
                 };
-                Ok(RegularStrip { first, source_map, mixed })
+                Ok(RegularStrip { first, source_map: source_map(from, beside)?, mixed })
             })
         }))
     }

@@ -50,6 +50,16 @@ choice! {
     }
 }
 
+choice! {
+    /// Where pieces may lie that the lattice puts between pixels.
+    pub enum Subpixel {
+        /// At the nearest pixel: every pixel is a copy.
+        Off = "off",
+        /// There: pixels are interpolated.
+        On = "on",
+    }
+}
+
 /// Which lattice is followed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Guide {
@@ -110,6 +120,8 @@ params! {
         candidates: usize = 64, in 1..=65536;
         /// How far from its place on the lattice a piece for a gap may come from.
         tolerance: usize = 3, in 0..=64, unit "px";
+        /// Whether pieces that the lattice puts between pixels are interpolated there (Lanczos), or moved to the nearest pixel and copied.
+        subpixel: Subpixel = Subpixel::Off;
         /// By what a piece for a gap is chosen.
         matching: Matching = Matching::Color;
         /// How far such a piece may be bent so that lines meet that do not by themselves; 0 switches it off.

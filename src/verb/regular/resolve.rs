@@ -5,6 +5,7 @@ use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
 use crate::base::params::{OrAuto, Value as _};
 use crate::image::color::{ColorModel, MatchSpace};
+use crate::image::interpolate::REACH;
 use crate::image::mask::Mask;
 use crate::image::picture::Picture;
 use crate::method::flatten;
@@ -12,7 +13,7 @@ use crate::search::patchmatch::Wrap;
 use crate::signal::basis::{Basis, area, coefficients, combined, dot, reduced};
 use crate::verb::lattice::{LatticeParams, detect};
 use crate::verb::params::Size;
-use crate::verb::regular::params::{Guide, RegularParams};
+use crate::verb::regular::params::{Guide, RegularParams, Subpixel};
 
 /// Longest side of a texture, in pixels.
 const MAX_SIDE: usize = 1 << 20;
@@ -160,7 +161,8 @@ pub(super) fn blocks(
     let short = width.min(height) as f64;
     // Some place of every phase lies in a rectangle as large as the cell's bounding box.
     let cell = lattice.map_or(0.0, |[a, b]| (a[0].abs() + b[0].abs()).max(a[1].abs() + b[1].abs()));
-    let slack = (params.deform + params.tolerance) as f64;
+    let kernel = if params.subpixel == Subpixel::On && lattice.is_some() { REACH } else { 0 };
+    let slack = (params.deform + params.tolerance + kernel) as f64;
     let room = (short - cell - 2.0 * slack) / (1.0 + 2.0 * BORDER_SHARE);
     let wish =
         lattice.map_or(short / 8.0, |basis| (BLOCK_SHARE * area(basis).sqrt()).max(BLOCK_PIXELS));
@@ -180,7 +182,7 @@ pub(super) fn blocks(
         let expected = format!("1 to {} (half the block)", block / 2);
         return Err(Error::parameter("border", expected, border));
     }
-    let need = block + 2 * border + 2 * params.deform;
+    let need = block + 2 * border + 2 * (params.deform + kernel);
     if width.min(height) < need {
         let what = "the photo".into();
         let remedy = format!(
