@@ -38,7 +38,7 @@ pub use image::sigma_map::SigmaMap;
 pub use image::sourcemap::{Origin, SourceMap};
 pub use image::symmetry::Symmetry;
 pub use method::noise::Filter;
-pub use method::representative::Place;
+pub use method::representative::{Place, Similarity};
 pub use verb::extract::{
     ExtractParams, ExtractReport, ExtractedTile, Extraction, FoundPeriod, PeriodSource, Scaling,
     extract,

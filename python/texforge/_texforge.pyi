@@ -16,7 +16,7 @@ _Map = tuple[Any, _Size, list[_Size], Any]
 _MapOut = tuple[bytearray, _Size, list[_Size], bytearray | None]
 _Palette = tuple[list[float], list[tuple[float, float]], _PictureOut]
 _Extracted = tuple[
-    _PictureOut, _MapOut | None, tuple[int, int], list[float], tuple[float, float, float]
+    _PictureOut, _MapOut | None, tuple[int, int], list[float], tuple[float, float, float], str
 ]
 _TileOut = tuple[_PictureOut, _MapOut | None, list[tuple[str, _PictureOut]], str, list[_Step]]
 

@@ -49,6 +49,7 @@ __all__ = [
     "SampleType",
     "Scaling",
     "Seam",
+    "Similarity",
     "Snap",
     "SourceMap",
     "Step",
@@ -80,6 +81,8 @@ Follow: TypeAlias = Literal["off"] | Literal["auto"]
 """Whether a tile follows the photo's lattice."""
 Scaling: TypeAlias = Literal["down"] | Literal["off"]
 """Whether a photo is scaled so that its period is a whole number of pixels."""
+Similarity: TypeAlias = Literal["squared"] | Literal["absolute"]
+"""How differences of colours count."""
 Tileable: TypeAlias = Literal["none"] | Literal["both"] | Literal["x"] | Literal["y"]
 """In which directions a near-regular texture repeats."""
 Straightening: TypeAlias = Literal["off"] | Literal["on"]

@@ -8,7 +8,7 @@ use serde_json::json;
 
 use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
-use crate::base::record::{Typed, record_of, typed_params};
+use crate::base::record::{Typed, typed_params};
 use crate::cli::maps::{self, Asked, Map};
 use crate::cli::show::duration;
 use crate::cli::small::{SCHEMA_VERSION, print_json};
@@ -28,6 +28,7 @@ Examples:
   texforge extract cloth.jpg -o cloth_tiles
   texforge extract cloth.jpg -o cloth_tiles --count 8 --periods 2
   texforge extract facade.jpg -o facade_tiles --period 537x638
+  texforge extract cloth.jpg -o cloth_tiles --similarity absolute
   texforge extract facade.jpg -o facade_tiles --flatten 0.3 --band 24
   texforge extract scan.png -o tiles --mask usable.png --map normal=scan_nrm.png
   texforge extract cloth.jpg -o tiles --scale off --save-source-maps";
@@ -246,7 +247,7 @@ fn write(
     for (i, tile) in made.tiles.iter().enumerate() {
         let picture = &tile.picture;
         let file = name("tile", i, picture);
-        add("tile", None, &file, picture, MapKind::Color, Some(&record(made, i)))?;
+        add("tile", None, &file, picture, MapKind::Color, Some(&made.record(i)))?;
         for (wanted, tiles) in &of_maps {
             let path = output_path(Path::new(&file), wanted.name, &tiles[i]);
             let path = path.to_string_lossy();
@@ -271,17 +272,6 @@ fn write(
     }
     session.staging.commit(request.force)?;
     Ok(all.into_iter().map(|(written, _)| written).collect())
-}
-
-/// How a tile was made, for the file itself. Holds nothing that differs between equal runs.
-fn record(made: &Extraction, i: usize) -> String {
-    let (report, tile) = (&made.report, &made.tiles[i]);
-    let params = typed_params(&ExtractParams::schema(), &report.params);
-    let mut record = record_of(ExtractParams::VERB, report.version, report.seed, &params);
-    record["period"] = json!(report.period.sides);
-    record["scale"] = json!(report.scale);
-    record["photo_place"] = json!(tile.photo_place);
-    record.to_string()
 }
 
 fn lines(request: &Request, made: &Extraction, elapsed: std::time::Duration) -> Vec<String> {

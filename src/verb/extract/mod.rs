@@ -6,12 +6,14 @@ mod period;
 use std::time::Instant;
 
 use serde::Serialize;
+use serde_json::json;
 
 use crate::analyze::lattice;
 use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
 use crate::base::memory::ensure_available;
 use crate::base::params::Value as _;
+use crate::base::record::{record_of, typed_params};
 use crate::image::mask::Mask;
 use crate::image::material::MapKind;
 use crate::image::picture::Picture;
@@ -92,8 +94,8 @@ pub struct ExtractReport {
 pub struct ExtractedTile {
     /// The tile, in the photo's own sample type.
     pub picture: Picture,
-    /// Where it lies in the scaled photo, and how good it is there, in squared CIE L*a*b* units. Of
-    /// the tile as cut out: a band is made anew after that.
+    /// Where it lies in the scaled photo, and how good it is there, in CIE L*a*b* units, squared unless
+    /// the similarity is absolute. Of the tile as cut out: a band is made anew after that.
     pub place: Place,
     /// Where its upper left corner lies in the photo as it is: pixels to the right and downwards.
     pub photo_place: [f64; 2],
@@ -128,6 +130,17 @@ impl Extraction {
         let from = |i: usize, at: usize, n: usize| ((i + n - at % n) % n) as u32;
         let yx = (0..h * w).map(|i| [from(i / w, place.y, th), from(i % w, place.x, tw)]);
         SourceMap::new(size, (th, tw), yx.collect())?.apply(picture, MapKind::Color)
+    }
+
+    /// How tile `i` was made, for its file: JSON that holds nothing that differs between equal runs.
+    pub(crate) fn record(&self, i: usize) -> String {
+        let report = &self.report;
+        let params = typed_params(&ExtractParams::schema(), &report.params);
+        let mut record = record_of(ExtractParams::VERB, report.version, report.seed, &params);
+        record["period"] = json!(report.period.sides);
+        record["scale"] = json!(report.scale);
+        record["photo_place"] = json!(self.tiles[i].photo_place);
+        record.to_string()
     }
 
     /// Another map of the photo's material, of any resolution, cut at the places of the tiles: their
@@ -203,7 +216,7 @@ pub fn extract(
         let scaled = frame.read(photo, MapKind::Color)?;
         let flags = frame.usable(mask.as_ref());
         let codes = Codes::new(&colors(&scaled), frame.size(), flags.clone());
-        let costs = Costs::new(ctx, &codes, tile)?;
+        let costs = Costs::new(ctx, &codes, tile, params.similarity)?;
         Ok((scaled, flags, costs))
     })?;
     let positions = costs.count();

@@ -1,6 +1,7 @@
 //! [`ExtractParams`]: what can be asked of an extraction, and its defaults.
 
 use crate::base::params::{Value, choice, params};
+use crate::method::representative::Similarity;
 
 /// Where the period comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -71,6 +72,8 @@ params! {
         scale: Scaling = Scaling::Down;
         /// How many tiles, the best first.
         count: usize = 4, in 1..=100;
+        /// How differences count, of edges as of the tiling from the photo: squared (the paper's), or absolute, which a few stains or odd periods do not mislead.
+        similarity: Similarity = Similarity::Squared;
         /// Weight of continuity, of how well a tile's edges fit each other; none chooses it such that it counts as much as resemblance.
         alpha: Option<f32> = None;
         /// Weight of resemblance, of how much the tiling is like the photo.
