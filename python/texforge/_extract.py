@@ -191,7 +191,7 @@ class Extraction:
                 add(f"tile_{number:02}_{name}", image, of_map, encoding)
             add(f"tiling_{number:02}", tile.tiling(), kind, tile.encoding)
         add("sheet", self.sheet, "color", "srgb")
-        with _folder(base):
+        with made_folder(base):
             _texforge.write(files=files, overwrite=bool(overwrite))
         return [Path(path) for path, *_ in files]
 
@@ -206,7 +206,7 @@ class Extraction:
 
 
 @contextlib.contextmanager
-def _folder(path: Path) -> Iterator[None]:
+def made_folder(path: Path) -> Iterator[None]:
     """Make a folder if it is not there, and take it away again if what follows fails."""
     was_there = path.is_dir()
     try:
@@ -267,8 +267,8 @@ def extract(
     count : int
         How many tiles, 1 to 100; fewer come back if no more fit beside each other.
     similarity : {"squared", "absolute"}
-        How differences count, of edges as of the tiling from the photo: ``"squared"`` (the paper's),
-        or ``"absolute"``, which a few stains or odd periods do not mislead.
+        How differences count, of edges as of the tiling from the photo: ``"squared"`` (the
+        paper's), or ``"absolute"``, which a few stains or odd periods do not mislead.
     alpha : float, optional
         Weight of continuity: of how well a tile's edges fit each other. By default such that it
         counts as much as resemblance.
@@ -341,8 +341,7 @@ def extract(
     values = dict(locals())
     photo = _arrays.picture(image, "the photo", encoding)
     texts = [
-        (param["name"], _text(param, values[param["name"]]))
-        for param in _texforge.schema("extract")
+        (param["name"], text(param, values[param["name"]])) for param in _texforge.schema("extract")
     ]
     others = {name: _api.maps_of(other, name, 0) for name, other in (maps or {}).items()}
     with reporting(progress) as callback:
@@ -398,7 +397,7 @@ def extract(
     )
 
 
-def _text(param: Mapping[str, Any], value: Any) -> str:
+def text(param: Mapping[str, Any], value: Any) -> str:
     """Return an argument as the text that the core reads."""
     if param["kind"] == "period" and not isinstance(value, str):
         sides = tuple(value) if isinstance(value, tuple | list) else ()

@@ -22,6 +22,7 @@ _TileOut = tuple[_PictureOut, _MapOut | None, list[tuple[str, _PictureOut]], str
 
 __all__ = [
     "Noise",
+    "Wang",
     "__version__",
     "apply",
     "cli_main",
@@ -43,6 +44,7 @@ __all__ = [
     "schema",
     "texture_cost",
     "tiles",
+    "wang",
     "write",
     "write_files",
     "write_source_map",
@@ -102,6 +104,20 @@ class Noise:
     ) -> Noise: ...
     def export(self, *, target: str, name: str) -> list[tuple[str, bytes]]: ...
 
+class Wang:
+    def plane(self, *, size: _Size, seed: int, only: str | None) -> _PictureOut: ...
+    def layout(self, *, rows: int, columns: int, seed: int) -> bytes: ...
+    def save(self, *, folder: str, plane: _Size, seed: int, overwrite: bool) -> list[str]: ...
+
+def wang(
+    *,
+    photo: _Picture,
+    mask: _Picture | None,
+    maps: list[tuple[str, list[_Picture], str]],
+    params: list[tuple[str, str]],
+    threads: int,
+    progress: Callable[[float], object] | None,
+) -> tuple[Wang, _PictureOut, _MapOut | None, list[tuple[str, _PictureOut]], str]: ...
 def fit_noise(
     *,
     maps: list[tuple[str, _Picture, str]],

@@ -16,6 +16,7 @@ use crate::cli::sources::Sources;
 use crate::cli::summary::{Seconds, Written};
 use crate::cli::work::{Session, supervise};
 use crate::cli::{args, files};
+use crate::image::io::check_place;
 use crate::image::mask::Mask;
 use crate::image::material::{MapKind, output_path};
 use crate::image::picture::Picture;
@@ -156,23 +157,6 @@ impl Request {
     /// Fails if the folder cannot be, or holds one of the files already.
     fn check_places(&self, photo: Option<&Picture>, maps: &[Map]) -> Result<()> {
         let folder = &self.folder;
-        if folder == Path::new("-") {
-            return Err(Error::parameter("output", "a folder, as there are several files", "`-`"));
-        }
-        if !folder.exists() {
-            // What could be made here could be made in it.
-            return files::check_place(&folder.with_file_name(".texforge.png"), &[], true).map_err(
-                |error| match error {
-                    Error::Io { action, source, .. } => {
-                        Error::Io { action, path: folder.clone(), source }
-                    }
-                    error => error,
-                },
-            );
-        }
-        if !folder.is_dir() {
-            return Err(Error::Exists { path: folder.clone() });
-        }
         let mut files = vec![folder.join("sheet.png")];
         for i in 0..self.params.count {
             files.extend(photo.map(|photo| folder.join(name("tile", i, photo))));
@@ -187,8 +171,35 @@ impl Request {
         let mut inputs = self.inputs();
         inputs.extend(self.maps.paths());
         inputs.extend(maps.iter().flat_map(|m| &m.wanted.paths).map(PathBuf::as_path));
-        files.iter().try_for_each(|file| files::check_place(file, &inputs, self.force))
+        check_folder(folder, &files, &inputs, self.force)
     }
+}
+
+/// Fails if the folder cannot be, or holds one of the files already.
+pub(super) fn check_folder(
+    folder: &Path,
+    files: &[PathBuf],
+    inputs: &[&Path],
+    force: bool,
+) -> Result<()> {
+    if folder == Path::new("-") {
+        return Err(Error::parameter("output", "a folder, as there are several files", "`-`"));
+    }
+    if !folder.exists() {
+        // What could be made here could be made in it.
+        return files::check_place(&folder.with_file_name(".texforge.png"), &[], true).map_err(
+            |error| match error {
+                Error::Io { action, source, .. } => {
+                    Error::Io { action, path: folder.to_owned(), source }
+                }
+                error => error,
+            },
+        );
+    }
+    if !folder.is_dir() {
+        return Err(Error::Exists { path: folder.to_owned() });
+    }
+    files.iter().try_for_each(|file| check_place(file, inputs, force))
 }
 
 fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Vec<String>)> {

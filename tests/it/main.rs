@@ -19,3 +19,4 @@ mod search;
 mod support;
 mod tile;
 mod views;
+mod wang;
