@@ -87,6 +87,10 @@ pub fn choose(ctx: &Ctx, grid: &Grid<'_>, phases: &[[f64; 2]]) -> Result<Option<
     Ok(best.map(|samples| grid.settled(samples, PASSES)))
 }
 
+fn beside(cell: usize) -> usize {
+    (cell / BESIDE).clamp(1, MOST_BESIDE)
+}
+
 impl Grid<'_> {
     fn size(&self) -> (usize, usize) {
         (self.image.height(), self.image.width())
@@ -100,10 +104,6 @@ impl Grid<'_> {
     /// Where period `k` begins along a side of the tile of this length.
     fn period(&self, k: usize, side: usize) -> usize {
         (k * side + self.periods / 2) / self.periods
-    }
-
-    fn beside(&self, cell: usize) -> usize {
-        (cell / BESIDE).clamp(1, MOST_BESIDE)
     }
 
     /// The best samples whose tiles begin there, of at most so many places in either direction.
@@ -222,7 +222,7 @@ impl Grid<'_> {
     /// The samples, each moved by what its period lies beside its place.
     fn settled(&self, mut samples: Samples, passes: usize) -> Samples {
         let (ch, cw) = self.cell();
-        let (reach_y, reach_x) = (self.beside(ch) as i64, self.beside(cw) as i64);
+        let (reach_y, reach_x) = (beside(ch) as i64, beside(cw) as i64);
         let places = samples;
         let cost = |place: Offset, is_horizontal: bool, samples: &Samples| -> u64 {
             if is_horizontal {

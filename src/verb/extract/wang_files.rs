@@ -105,7 +105,7 @@ impl WangSet {
             files.push(WangFile { role, map: None, name: name.to_owned(), content });
         };
         add("index", INDEX, index);
-        let text = format!("{:#}\n", self.document(record, plane, seed)?);
+        let text = format!("{:#}\n", self.document(&record, plane, seed)?);
         add("document", DOCUMENT, WangFileContent::Text(text));
         Ok(files)
     }
@@ -121,7 +121,7 @@ impl WangSet {
     }
 
     /// What another program has to know to lay the tiles.
-    fn document(&self, record: Value, plane: (usize, usize), seed: u64) -> Result<Value> {
+    fn document(&self, record: &Value, plane: (usize, usize), seed: u64) -> Result<Value> {
         let ((h, w), (rows, columns)) = (self.tile, self.set.atlas());
         let name = |stem: &str| file_name(stem, None, &self.atlas);
         let tile = |(k, edges): (usize, _)| {
