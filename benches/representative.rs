@@ -8,8 +8,9 @@ use std::hint::black_box;
 
 use criterion::{Criterion, Throughput};
 use texforge::Ctx;
+use texforge::base::params::Value as _;
 use texforge::base::rng::Rng;
-use texforge::method::representative::{Codes, Costs};
+use texforge::method::representative::{Codes, Costs, Similarity};
 use texforge::signal::self_difference::self_difference;
 
 /// A picture that repeats by a cell of this size (height, width), with noise.
@@ -43,8 +44,8 @@ fn brute_force(codes: &Codes, (h, w): (usize, usize), (th, tw): (usize, usize)) 
 
 fn main() {
     let ctx = Ctx::new(0, 0).unwrap();
-    let search = |codes: &Codes, tile| {
-        let costs = Costs::new(&ctx, codes, tile)?;
+    let search = |codes: &Codes, tile, similarity| {
+        let costs = Costs::new(&ctx, codes, tile, similarity)?;
         let alpha = costs.balanced_weight();
         Ok((costs.best((alpha, 1.0), 1.0, 0.25, 4), costs))
     };
@@ -52,8 +53,8 @@ fn main() {
     // The answer first: resemblance alone, as brute force knows it.
     let (size, tile) = ((60, 90), (13, 17));
     let small = Codes::new(&cloth(size, tile), size, None);
-    let found = ctx.install(|| Ok(Costs::new(&ctx, &small, tile)?.best((0.0, 1.0), 1.0, 0.0, 1)));
-    let found = found.unwrap()[0];
+    let costs = ctx.install(|| Costs::new(&ctx, &small, tile, Similarity::Squared)).unwrap();
+    let found = costs.best((0.0, 1.0), 1.0, 0.0, 1)[0];
     assert_eq!((found.y, found.x), brute_force(&small, size, tile), "the best place");
 
     // The paper's Fig. 7 (a): 1200 x 600, a tile of 196 x 148, 212 s for a ten-thousandth of them.
@@ -64,9 +65,12 @@ fn main() {
     let mut bench = Criterion::default().without_plots().sample_size(20).configure_from_args();
     let mut group = bench.benchmark_group("representative tile 1200x600");
     group.throughput(Throughput::Elements(((600 - 147) * (1200 - 195)) as u64));
-    group.bench_function("all positions of a 196x148 tile, the best 4", |b| {
-        b.iter(|| ctx.install(|| search(black_box(&codes), tile)).unwrap());
-    });
+    for similarity in [Similarity::Squared, Similarity::Absolute] {
+        let name = format!("all positions of a 196x148 tile, the best 4, {}", similarity.show());
+        group.bench_function(name, |b| {
+            b.iter(|| ctx.install(|| search(black_box(&codes), tile, similarity)).unwrap());
+        });
+    }
     group.bench_function("self-difference along the rows", |b| {
         b.iter(|| ctx.install(|| Ok(self_difference(black_box(&planes), size, None))).unwrap());
     });

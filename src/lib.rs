@@ -38,10 +38,11 @@ pub use image::sigma_map::SigmaMap;
 pub use image::sourcemap::{Origin, SourceMap};
 pub use image::symmetry::Symmetry;
 pub use method::noise::Filter;
-pub use method::representative::Place;
+pub use method::representative::{Place, Similarity};
+pub use verb::extract::wang::{Edges, TileSet, WangReport, WangSet, wang};
 pub use verb::extract::{
     ExtractParams, ExtractReport, ExtractedTile, Extraction, FoundPeriod, PeriodSource, Scaling,
-    extract,
+    WangParams, extract,
 };
 pub use verb::inputs::Inputs;
 pub use verb::lattice::{Lattice, LatticeParams, detect_lattice, lattice_autocorrelation};

@@ -4,9 +4,9 @@
 and says which pixel of the photo each of its pixels is, so that other maps of the same material
 can follow (`apply`). `palette` shows how even it can become. `detect_lattice` finds by which
 displacements a photo of bricks, tiles or cloth repeats, `extract` cuts out the tile of such a photo
-that stands best for all of it, `regular` makes a texture of any size from it, `regular_to_file`
-one larger than memory. `fit_noise` makes a procedural texture of a photo: a kilobyte that has a
-value at every point. `texture_cost`
+that stands best for all of it, `wang` makes a few tiles of it that fill a plane without repeating,
+`regular` makes a texture of any size from it, `regular_to_file` one larger than memory. `fit_noise`
+makes a procedural texture of a photo: a kilobyte that has a value at every point. `texture_cost`
 measures how much a texture looks like its photo.
 `read_image` and `write_image` keep all the bits that files have. `study` compares the ways to
 tile over many photos.
@@ -72,6 +72,7 @@ from texforge._types import (
     SampleType,
     Scaling,
     Seam,
+    Similarity,
     Snap,
     SourceMap,
     Step,
@@ -82,8 +83,10 @@ from texforge._types import (
     Tile,
     Tileable,
     TileOptions,
+    TileSet,
     Weights,
 )
+from texforge._wang import WangEdges, WangSet, wang
 
 __all__ = [
     "AccessError",
@@ -129,6 +132,7 @@ __all__ = [
     "SampleType",
     "Scaling",
     "Seam",
+    "Similarity",
     "Snap",
     "SourceMap",
     "Step",
@@ -140,7 +144,10 @@ __all__ = [
     "TextureCost",
     "Tile",
     "TileOptions",
+    "TileSet",
     "Tileable",
+    "WangEdges",
+    "WangSet",
     "Weights",
     "__version__",
     "apply",
@@ -156,5 +163,6 @@ __all__ = [
     "texture_cost",
     "tile",
     "tile_variants",
+    "wang",
     "write_image",
 ]

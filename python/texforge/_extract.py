@@ -19,6 +19,7 @@ from texforge._types import (  # noqa: TC001 (the signatures can be resolved at 
     ImageLike,
     Progress,
     Scaling,
+    Similarity,
 )
 
 if TYPE_CHECKING:
@@ -46,10 +47,11 @@ class ExtractedTile:
     photo_place : (float, float)
         The same in the photo as it is: rows and columns from its upper left corner.
     continuity : float
-        The mean squared difference of the pixels that meet where tiles do (the paper's h), in
-        squared CIE L*a*b* units; of the tile before a band was made anew. Lower is better.
+        The mean difference of the pixels that meet where tiles do (the paper's h), in CIE L*a*b*
+        units, squared unless the similarity is ``"absolute"``; of the tile before a band was made
+        anew. Lower is better.
     resemblance : float
-        The mean squared difference of the photo and the tiling (SSDN), likewise.
+        The mean difference of the photo and the tiling (SSDN), likewise.
     score : float
         alpha times the one plus beta times the other.
     maps : dict
@@ -61,6 +63,8 @@ class ExtractedTile:
         Height and width of the scaled photo.
     encoding : {"srgb", "linear", "data"}
         What the numbers of `image` mean.
+    record : str
+        How it was made, as its file says it: JSON.
     """
 
     image: npt.NDArray[Any]
@@ -73,6 +77,7 @@ class ExtractedTile:
     source_map: npt.NDArray[np.int32] | None
     scaled_size: tuple[int, int]
     encoding: Encoding
+    record: str
 
     def tiling(self) -> npt.NDArray[Any]:
         """Return a picture as large as the scaled photo: the tile repeated, where it was found."""
@@ -140,7 +145,8 @@ class Extraction:
     def save(self, folder: PathType, *, overwrite: bool = False) -> list[Path]:
         """Write the tiles, their maps and tilings and the sheet: all of these files or none.
 
-        They are named as by ``texforge extract``.
+        They are named as by ``texforge extract``, and as there those of the tiles record how they
+        were made.
 
         Parameters
         ----------
@@ -165,20 +171,27 @@ class Extraction:
         base = Path(_arrays.path(folder))
         files: list[tuple[str, Any, str, str | None]] = []
 
-        def add(name: str, image: npt.NDArray[Any], kind: str, encoding: Encoding) -> None:
+        def add(
+            name: str,
+            image: npt.NDArray[Any],
+            kind: str,
+            encoding: Encoding,
+            record: str | None = None,
+        ) -> None:
             path = base / f"{name}.{'exr' if image.dtype.kind == 'f' else 'png'}"
-            files.append((str(path), _arrays.picture(image, name, encoding).packed(), kind, None))
+            picture = _arrays.picture(image, name, encoding).packed()
+            files.append((str(path), picture, kind, record))
 
         for number, tile in enumerate(self.tiles, 1):
             kind = "data" if tile.encoding == "data" else "color"
-            add(f"tile_{number:02}", tile.image, kind, tile.encoding)
+            add(f"tile_{number:02}", tile.image, kind, tile.encoding, tile.record)
             for name, image in tile.maps.items():
                 of_map = _texforge.map_kind(name)
                 encoding: Encoding = "data" if of_map != "color" else tile.encoding
                 add(f"tile_{number:02}_{name}", image, of_map, encoding)
             add(f"tiling_{number:02}", tile.tiling(), kind, tile.encoding)
         add("sheet", self.sheet, "color", "srgb")
-        with _folder(base):
+        with made_folder(base):
             _texforge.write(files=files, overwrite=bool(overwrite))
         return [Path(path) for path, *_ in files]
 
@@ -193,7 +206,7 @@ class Extraction:
 
 
 @contextlib.contextmanager
-def _folder(path: Path) -> Iterator[None]:
+def made_folder(path: Path) -> Iterator[None]:
     """Make a folder if it is not there, and take it away again if what follows fails."""
     was_there = path.is_dir()
     try:
@@ -216,6 +229,7 @@ def extract(
     periods: int = 1,
     scale: Scaling = "down",
     count: int = 4,
+    similarity: Similarity = "squared",
     alpha: float | None = None,
     beta: float = 1.0,
     keep: float = 1.0,
@@ -252,6 +266,9 @@ def extract(
         copies the photo's pixels.
     count : int
         How many tiles, 1 to 100; fewer come back if no more fit beside each other.
+    similarity : {"squared", "absolute"}
+        How differences count, of edges as of the tiling from the photo: ``"squared"`` (the
+        paper's), or ``"absolute"``, which a few stains or odd periods do not mislead.
     alpha : float, optional
         Weight of continuity: of how well a tile's edges fit each other. By default such that it
         counts as much as resemblance.
@@ -324,8 +341,7 @@ def extract(
     values = dict(locals())
     photo = _arrays.picture(image, "the photo", encoding)
     texts = [
-        (param["name"], _text(param, values[param["name"]]))
-        for param in _texforge.schema("extract")
+        (param["name"], text(param, values[param["name"]])) for param in _texforge.schema("extract")
     ]
     others = {name: _api.maps_of(other, name, 0) for name, other in (maps or {}).items()}
     with reporting(progress) as callback:
@@ -356,6 +372,7 @@ def extract(
             source_map=None if source_map is None else _api.map_positions(source_map),
             scaled_size=(scaled_height, scaled_width),
             encoding=_arrays.array_encoding(picture[3]),
+            record=record,
         )
         for i, (
             picture,
@@ -363,6 +380,7 @@ def extract(
             place,
             photo_place,
             (continuity, resemblance, score),
+            record,
         ) in enumerate(made)
     ]
     (across_x, across_y), (down_x, down_y) = report["period"]["sides"]
@@ -379,7 +397,7 @@ def extract(
     )
 
 
-def _text(param: Mapping[str, Any], value: Any) -> str:
+def text(param: Mapping[str, Any], value: Any) -> str:
     """Return an argument as the text that the core reads."""
     if param["kind"] == "period" and not isinstance(value, str):
         sides = tuple(value) if isinstance(value, tuple | list) else ()

@@ -16,12 +16,13 @@ _Map = tuple[Any, _Size, list[_Size], Any]
 _MapOut = tuple[bytearray, _Size, list[_Size], bytearray | None]
 _Palette = tuple[list[float], list[tuple[float, float]], _PictureOut]
 _Extracted = tuple[
-    _PictureOut, _MapOut | None, tuple[int, int], list[float], tuple[float, float, float]
+    _PictureOut, _MapOut | None, tuple[int, int], list[float], tuple[float, float, float], str
 ]
 _TileOut = tuple[_PictureOut, _MapOut | None, list[tuple[str, _PictureOut]], str, list[_Step]]
 
 __all__ = [
     "Noise",
+    "Wang",
     "__version__",
     "apply",
     "cli_main",
@@ -43,6 +44,7 @@ __all__ = [
     "schema",
     "texture_cost",
     "tiles",
+    "wang",
     "write",
     "write_files",
     "write_source_map",
@@ -102,6 +104,21 @@ class Noise:
     ) -> Noise: ...
     def export(self, *, target: str, name: str) -> list[tuple[str, bytes]]: ...
 
+@final
+class Wang:
+    def plane(self, *, size: _Size, seed: int, only: str | None) -> _PictureOut: ...
+    def layout(self, *, rows: int, columns: int, seed: int) -> bytes: ...
+    def save(self, *, folder: str, plane: _Size, seed: int, overwrite: bool) -> list[str]: ...
+
+def wang(
+    *,
+    photo: _Picture,
+    mask: _Picture | None,
+    maps: list[tuple[str, list[_Picture], str]],
+    params: list[tuple[str, str]],
+    threads: int,
+    progress: Callable[[float], object] | None,
+) -> tuple[Wang, _PictureOut, _MapOut | None, list[tuple[str, _PictureOut]], str]: ...
 def fit_noise(
     *,
     maps: list[tuple[str, _Picture, str]],

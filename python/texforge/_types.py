@@ -49,6 +49,7 @@ __all__ = [
     "SampleType",
     "Scaling",
     "Seam",
+    "Similarity",
     "Snap",
     "SourceMap",
     "Step",
@@ -58,6 +59,7 @@ __all__ = [
     "TextureCost",
     "Tile",
     "TileOptions",
+    "TileSet",
     "Tileable",
     "Weights",
 ]
@@ -81,6 +83,10 @@ Follow: TypeAlias = Literal["off"] | Literal["auto"]
 """Whether a tile follows the photo's lattice."""
 Scaling: TypeAlias = Literal["down"] | Literal["off"]
 """Whether a photo is scaled so that its period is a whole number of pixels."""
+TileSet: TypeAlias = Literal["complete"] | Literal["minimal"]
+"""Which Wang tiles a set holds."""
+Similarity: TypeAlias = Literal["squared"] | Literal["absolute"]
+"""How differences of colours count."""
 Tileable: TypeAlias = Literal["none"] | Literal["both"] | Literal["x"] | Literal["y"]
 """In which directions a near-regular texture repeats."""
 Straightening: TypeAlias = Literal["off"] | Literal["on"]

@@ -8,7 +8,7 @@ use clap::{Arg, ArgAction, ArgMatches, Command, ValueHint, value_parser};
 use crate::base::params::{Param, Value as _};
 use crate::cli::small::SCHEMAS;
 use crate::cli::sources::Sources;
-use crate::cli::{extract, maps, noise, palette, regular, study};
+use crate::cli::{extract, maps, noise, palette, regular, study, wang};
 use crate::image::material::MapKind;
 use crate::verb::lattice::LatticeParams;
 use crate::verb::params::TileParams;
@@ -61,6 +61,7 @@ pub(super) fn command() -> Command {
         .subcommand(regular::command())
         .subcommand(noise::command())
         .subcommand(extract::command())
+        .subcommand(wang::command())
         .subcommand(apply())
         .subcommand(lattice())
         .subcommand(study::command())
@@ -105,7 +106,7 @@ pub(super) fn command() -> Command {
                 .arg(
                     Arg::new("verb")
                         .value_name("COMMAND")
-                        .value_parser(["tile", "palette", "regular", "noise", "extract", "apply", "lattice", "study", "params", "info", "completions"])
+                        .value_parser(["tile", "palette", "regular", "noise", "extract", "wang", "apply", "lattice", "study", "params", "info", "completions"])
                         .help("The page of this command"),
                 ),
         )

@@ -8,7 +8,7 @@ use serde_json::json;
 
 use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
-use crate::base::record::{Typed, record_of, typed_params};
+use crate::base::record::{Typed, typed_params};
 use crate::cli::maps::{self, Asked, Map};
 use crate::cli::show::duration;
 use crate::cli::small::{SCHEMA_VERSION, print_json};
@@ -16,6 +16,7 @@ use crate::cli::sources::Sources;
 use crate::cli::summary::{Seconds, Written};
 use crate::cli::work::{Session, supervise};
 use crate::cli::{args, files};
+use crate::image::io::check_place;
 use crate::image::mask::Mask;
 use crate::image::material::{MapKind, output_path};
 use crate::image::picture::Picture;
@@ -28,6 +29,7 @@ Examples:
   texforge extract cloth.jpg -o cloth_tiles
   texforge extract cloth.jpg -o cloth_tiles --count 8 --periods 2
   texforge extract facade.jpg -o facade_tiles --period 537x638
+  texforge extract cloth.jpg -o cloth_tiles --similarity absolute
   texforge extract facade.jpg -o facade_tiles --flatten 0.3 --band 24
   texforge extract scan.png -o tiles --mask usable.png --map normal=scan_nrm.png
   texforge extract cloth.jpg -o tiles --scale off --save-source-maps";
@@ -155,23 +157,6 @@ impl Request {
     /// Fails if the folder cannot be, or holds one of the files already.
     fn check_places(&self, photo: Option<&Picture>, maps: &[Map]) -> Result<()> {
         let folder = &self.folder;
-        if folder == Path::new("-") {
-            return Err(Error::parameter("output", "a folder, as there are several files", "`-`"));
-        }
-        if !folder.exists() {
-            // What could be made here could be made in it.
-            return files::check_place(&folder.with_file_name(".texforge.png"), &[], true).map_err(
-                |error| match error {
-                    Error::Io { action, source, .. } => {
-                        Error::Io { action, path: folder.clone(), source }
-                    }
-                    error => error,
-                },
-            );
-        }
-        if !folder.is_dir() {
-            return Err(Error::Exists { path: folder.clone() });
-        }
         let mut files = vec![folder.join("sheet.png")];
         for i in 0..self.params.count {
             files.extend(photo.map(|photo| folder.join(name("tile", i, photo))));
@@ -186,8 +171,35 @@ impl Request {
         let mut inputs = self.inputs();
         inputs.extend(self.maps.paths());
         inputs.extend(maps.iter().flat_map(|m| &m.wanted.paths).map(PathBuf::as_path));
-        files.iter().try_for_each(|file| files::check_place(file, &inputs, self.force))
+        check_folder(folder, &files, &inputs, self.force)
     }
+}
+
+/// Fails if the folder cannot be, or holds one of the files already.
+pub(super) fn check_folder(
+    folder: &Path,
+    files: &[PathBuf],
+    inputs: &[&Path],
+    force: bool,
+) -> Result<()> {
+    if folder == Path::new("-") {
+        return Err(Error::parameter("output", "a folder, as there are several files", "`-`"));
+    }
+    if !folder.exists() {
+        // What could be made here could be made in it.
+        return files::check_place(&folder.with_file_name(".texforge.png"), &[], true).map_err(
+            |error| match error {
+                Error::Io { action, source, .. } => {
+                    Error::Io { action, path: folder.to_owned(), source }
+                }
+                error => error,
+            },
+        );
+    }
+    if !folder.is_dir() {
+        return Err(Error::Exists { path: folder.to_owned() });
+    }
+    files.iter().try_for_each(|file| check_place(file, inputs, force))
 }
 
 fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Vec<String>)> {
@@ -246,7 +258,7 @@ fn write(
     for (i, tile) in made.tiles.iter().enumerate() {
         let picture = &tile.picture;
         let file = name("tile", i, picture);
-        add("tile", None, &file, picture, MapKind::Color, Some(&record(made, i)))?;
+        add("tile", None, &file, picture, MapKind::Color, Some(&made.record(i)))?;
         for (wanted, tiles) in &of_maps {
             let path = output_path(Path::new(&file), wanted.name, &tiles[i]);
             let path = path.to_string_lossy();
@@ -271,17 +283,6 @@ fn write(
     }
     session.staging.commit(request.force)?;
     Ok(all.into_iter().map(|(written, _)| written).collect())
-}
-
-/// How a tile was made, for the file itself. Holds nothing that differs between equal runs.
-fn record(made: &Extraction, i: usize) -> String {
-    let (report, tile) = (&made.report, &made.tiles[i]);
-    let params = typed_params(&ExtractParams::schema(), &report.params);
-    let mut record = record_of(ExtractParams::VERB, report.version, report.seed, &params);
-    record["period"] = json!(report.period.sides);
-    record["scale"] = json!(report.scale);
-    record["photo_place"] = json!(tile.photo_place);
-    record.to_string()
 }
 
 fn lines(request: &Request, made: &Extraction, elapsed: std::time::Duration) -> Vec<String> {

@@ -20,6 +20,7 @@ mod sources;
 pub mod study;
 mod summary;
 mod tile;
+mod wang;
 mod work;
 
 use std::ffi::OsString;
@@ -47,6 +48,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
         "tile" => tile::run(matches),
         "palette" => palette::run(matches),
         "extract" => extract::run(matches),
+        "wang" => wang::run(matches),
         "apply" => apply::run(matches),
         "lattice" => lattice::run(matches),
         "regular" => regular::run(matches),

@@ -14,7 +14,7 @@ use crate::cli::work::{Session, supervise, watch_signals};
 use crate::cli::{args, files};
 use crate::image::material::MapKind;
 use crate::image::picture::{Encoding, Picture};
-use crate::verb::extract::ExtractParams;
+use crate::verb::extract::{ExtractParams, WangParams};
 use crate::verb::lattice::LatticeParams;
 use crate::verb::noise::{NoiseEditParams, NoiseParams};
 use crate::verb::params::TileParams;
@@ -32,6 +32,7 @@ pub(super) const SCHEMAS: &[Schema] = &[
     (LatticeParams::VERB, LatticeParams::schema),
     (RegularParams::VERB, RegularParams::schema),
     (ExtractParams::VERB, ExtractParams::schema),
+    (WangParams::VERB, WangParams::schema),
     (NoiseParams::VERB, NoiseParams::schema),
     (NoiseEditParams::VERB, NoiseEditParams::schema),
 ];

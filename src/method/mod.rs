@@ -6,3 +6,4 @@ pub mod noise;
 pub mod representative;
 pub mod rsgf;
 pub mod stationary;
+pub mod wang;

@@ -10,8 +10,9 @@ use crate::python::{NamedMap, enter, maps_of, mask_of};
 use crate::verb::extract::ExtractParams;
 
 /// A tile: the picture, the source map, its place (row, column), that in the photo (to the right,
-/// downwards), continuity, resemblance and score.
-type TileOut<'py> = (ArrayOut<'py>, Option<MapOut<'py>>, (usize, usize), [f64; 2], (f64, f64, f64));
+/// downwards), continuity, resemblance and score, how it was made.
+type TileOut<'py> =
+    (ArrayOut<'py>, Option<MapOut<'py>>, (usize, usize), [f64; 2], (f64, f64, f64), String);
 
 /// A further map: its name, and its piece of each tile.
 type MapTiles<'py> = (String, Vec<ArrayOut<'py>>);
@@ -61,6 +62,7 @@ pub(super) fn extract<'py>(
             (place.y, place.x),
             tile.photo_place,
             (place.continuity, place.resemblance, place.score),
+            made.record(i),
         ));
     }
     let mut of_maps = Vec::new();

@@ -11,6 +11,7 @@ mod error;
 mod extract;
 mod noise;
 mod regular;
+mod wang;
 
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -29,7 +30,7 @@ use crate::image::overlay;
 use crate::image::picture::Picture;
 use crate::image::rect::Rect;
 use crate::image::sigma_map::SigmaMap;
-use crate::verb::extract::ExtractParams;
+use crate::verb::extract::{ExtractParams, WangParams};
 use crate::verb::inputs::Inputs;
 use crate::verb::lattice::{Lattice, LatticeParams, detect_lattice, lattice_autocorrelation};
 use crate::verb::noise::{NoiseEditParams, NoiseParams};
@@ -362,7 +363,7 @@ fn map_kind(name: &str) -> String {
     material::classify(name).map_or(MapKind::Data, |(_, kind)| kind).show()
 }
 
-/// Every parameter of a Python function (`texture_cost`, `detect_lattice`, `extract`, `regular`,
+/// Every parameter of a Python function (`texture_cost`, `detect_lattice`, `extract`, `wang`, `regular`,
 /// `fit_noise`, `edit` of a procedural texture, else `tile`), with its default as text.
 #[pyfunction]
 #[pyo3(signature = (verb = "tile"))]
@@ -382,6 +383,7 @@ fn schema<'py>(py: Python<'py>, verb: &str) -> PyResult<Vec<Bound<'py, PyDict>>>
         TextureCostParams::VERB => TextureCostParams::schema(),
         "detect_lattice" => LatticeParams::schema(),
         ExtractParams::VERB => ExtractParams::schema(),
+        WangParams::VERB => WangParams::schema(),
         RegularParams::VERB => RegularParams::schema(),
         "fit_noise" => NoiseParams::schema(),
         "edit" => NoiseEditParams::schema(),
@@ -439,6 +441,8 @@ mod _texforge {
     use super::noise::{Noise, export_targets, fit_noise, write_files};
     #[pymodule_export]
     use super::regular::{regular, regular_to_file};
+    #[pymodule_export]
+    use super::wang::{Wang, wang};
     #[pymodule_export]
     use super::{
         apply, cli_main, cli_study, encode_png, error_kinds, fail, lattice, lattice_overlay,

@@ -4,7 +4,7 @@ use proptest::prelude::*;
 use texforge::base::rng::Rng;
 use texforge::{
     Ctx, Encoding, Error, ErrorKind, ExtractParams, Extraction, MapKind, Mask, PeriodSource,
-    Picture, Samples, Scaling, extract,
+    Picture, Samples, Scaling, Similarity, extract,
 };
 
 use crate::support::Folder;
@@ -165,11 +165,11 @@ mod periods {
 mod tiles {
     use super::*;
 
-    /// The mean squared difference of two pictures of grey data, full scale 100.
-    fn apart(a: &Picture, b: &Picture, usable: impl Fn(usize) -> bool) -> f64 {
+    /// The mean difference to this power of two pictures of grey data, full scale 100.
+    fn apart(a: &Picture, b: &Picture, power: i32, usable: impl Fn(usize) -> bool) -> f64 {
         let (a, b) = (a.samples(), b.samples());
         let all: Vec<usize> = (0..a.len()).filter(|&i| usable(i)).collect();
-        let one = |&i: &usize| (100.0 * (a.unit(i) - b.unit(i))).powi(2);
+        let one = |&i: &usize| (100.0 * (a.unit(i) - b.unit(i))).abs().powi(power);
         all.iter().map(one).sum::<f64>() / all.len() as f64
     }
 
@@ -179,7 +179,7 @@ mod tiles {
         fn costs_are_those_of_the_tiling_that_is_delivered(
             (h, w) in (17..40_usize, 17..40_usize),
             (ph, pw) in (2.0..8.0_f64, 2.0..8.0_f64),
-            whole: bool,
+            (whole, robust) in (any::<bool>(), any::<bool>()),
             masked in 0..4_u32,
             seed: u64,
         ) {
@@ -188,19 +188,22 @@ mod tiles {
             let mut rng = Rng::new(seed, 6, 0, 0);
             let flags: Vec<bool> = (0..h * w).map(|_| rng.below(200) >= masked).collect();
             let mask = Mask::new(h, w, flags.clone()).expect("mask");
-            let params = ExtractParams { count: 3, scale: Scaling::Off, ..given(pw, ph) };
+            let (similarity, power) =
+                if robust { (Similarity::Absolute, 1) } else { (Similarity::Squared, 2) };
+            let params = ExtractParams { count: 3, scale: Scaling::Off, similarity, ..given(pw, ph) };
             let Ok(found) = extract(&ctx(2), &photo, Some(&mask), &params) else {
                 return Ok(());
             };
             let (tw, th) = found.report.tile_size;
             for (i, tile) in found.tiles.iter().enumerate() {
                 let tiling = found.tiling(i).expect("tiling");
-                let want = apart(&photo, &tiling, |i| flags[i]);
+                let want = apart(&photo, &tiling, power, |i| flags[i]);
                 let got = tile.place.resemblance;
                 prop_assert!((got - want).abs() < 0.01 * want.max(1.0), "{} for {}", got, want);
                 let at = |y: usize, x: usize| 100.0 * tile.picture.samples().unit(y * tw + x);
-                let across: f64 = (0..th).map(|y| (at(y, tw - 1) - at(y, 0)).powi(2)).sum();
-                let down: f64 = (0..tw).map(|x| (at(th - 1, x) - at(0, x)).powi(2)).sum();
+                let across: f64 = (0..th).map(|y| (at(y, tw - 1) - at(y, 0)).abs().powi(power)).sum();
+                let down: f64 =
+                    (0..tw).map(|x| (at(th - 1, x) - at(0, x)).abs().powi(power)).sum();
                 let want = (across + down) / (2 * (tw + th - 1)) as f64;
                 let got = tile.place.continuity;
                 prop_assert!((got - want).abs() < 0.01 * want.max(1.0), "{} for {}", got, want);
@@ -272,6 +275,31 @@ mod tiles {
         assert!(like.resemblance < both.resemblance && both.resemblance < smooth.resemblance);
         // The paper's p: hardly any position is left but the smoothest.
         assert_eq!(with(Some(0.0), 1.0, 1e-6).continuity, smooth.continuity);
+    }
+
+    #[test]
+    fn a_stain_misleads_squares_and_not_absolute_differences() {
+        // 6 x 6 cells, weathered differently; something dark over nine of them.
+        let value = pattern([[30.0, 0.0], [0.0, 26.0]], 4);
+        let mut rng = Rng::new(7, 0, 0, 0);
+        let weather: Vec<f64> = (0..36).map(|_| f64::from(rng.below(201)) / 1000.0 - 0.1).collect();
+        let photo = |stained: bool| {
+            grey((156, 180), 0.05, |y, x| {
+                let (i, j) = ((y / 26.0) as usize, (x / 30.0) as usize);
+                let stain = if stained && i >= 3 && j >= 3 { -0.4 } else { 0.0 };
+                0.3 + 0.6 * value(y, x) + weather[i * 6 + j] + stain
+            })
+        };
+        let brightness = |stained, similarity| {
+            let params = ExtractParams { similarity, count: 1, ..given(30.0, 26.0) };
+            let tile = of(&photo(stained), &params).tiles.remove(0).picture;
+            let n = tile.samples().len();
+            (0..n).map(|i| tile.samples().unit(i)).sum::<f64>() / n as f64
+        };
+        let darker =
+            |similarity| (brightness(false, similarity) - brightness(true, similarity)).abs();
+        let (squared, absolute) = (darker(Similarity::Squared), darker(Similarity::Absolute));
+        assert!(squared > 0.03 && absolute < 0.2 * squared, "by {squared} and {absolute}");
     }
 
     #[test]

@@ -20,3 +20,4 @@ mod search;
 mod support;
 mod tile;
 mod views;
+mod wang;

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import subprocess
+import sys
 from typing import TYPE_CHECKING, Any
 
 import hypothesis
@@ -143,6 +146,20 @@ def test_files_are_those_of_the_command_line(tmp_path: Path) -> None:
     found.save(tmp_path / "out", overwrite=True)
 
 
+def test_saved_files_are_the_command_lines_to_the_byte(tmp_path: Path) -> None:
+    texforge.write_image(tmp_path / "cloth.png", cloth())
+    options: dict[str, Any] = {"count": 2, "period": (20.3, 28), "similarity": "absolute"}
+    found = texforge.extract(texforge.read_image(tmp_path / "cloth.png"), **options)
+    files = found.save(tmp_path / "saved")
+    command = [sys.executable, "-m", "texforge", "extract", "cloth.png", "-o", "run", "--count=2"]
+    command += ["--period=28x20.3", "--similarity=absolute"]
+    subprocess.run(command, cwd=tmp_path, check=True)
+    assert contents(tmp_path / "saved") == contents(tmp_path / "run")
+    record = json.loads(found.tiles[1].record)
+    assert (record["verb"], record["params"]["similarity"]) == ("extract", "absolute")
+    assert found.tiles[1].record.encode() in files[2].read_bytes()
+
+
 def contents(folder: Path) -> dict[str, bytes | None]:
     """Return the bytes of every file; None for a folder."""
     return {p.name: None if p.is_dir() else p.read_bytes() for p in folder.iterdir()}
@@ -213,6 +230,7 @@ BAD: dict[str, dict[str, Any]] = {
     "min_confidence": {"min_confidence": 2},
     "flatten": {"flatten": 0.001},
     "scale": {"scale": "up"},
+    "similarity": {"similarity": "median"},
     "a band that is thinner than a patch": {"period": (20, 28), "band": 4},
     "a band that leaves no middle": {"period": (20, 28), "band": 10},
     "seed": {"seed": -1},

@@ -7,4 +7,4 @@ mod frame;
 mod search;
 
 pub use frame::Frame;
-pub use search::{Codes, Costs, Place, STEPS};
+pub use search::{Codes, Costs, Place, STEPS, Similarity};

@@ -2,37 +2,34 @@
 
 mod params;
 mod period;
+mod prepare;
+pub mod wang;
+mod wang_files;
 
 use std::time::Instant;
 
 use serde::Serialize;
+use serde_json::json;
 
-use crate::analyze::lattice;
 use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
 use crate::base::memory::ensure_available;
-use crate::base::params::Value as _;
+use crate::base::record::{record_of, typed_params};
 use crate::image::mask::Mask;
 use crate::image::material::MapKind;
 use crate::image::picture::Picture;
 use crate::image::sheet;
 use crate::image::sourcemap::SourceMap;
 use crate::image::symmetry::Symmetry;
-use crate::method::flatten;
 use crate::method::representative::{self, Codes, Costs, Frame, Place};
 use crate::method::stationary::{self, Exemplar, Kept, Periods};
 use crate::search::patchmatch::Wrap;
-use crate::signal::basis::{Basis, dot};
+use crate::signal::basis::Basis;
 use crate::verb::params::TileParams;
 
-pub use params::{ExtractParams, PeriodSource, Scaling};
-use period::{colors, find_period, framed};
-
-/// Shortest side of a photo that can be looked at: two periods of a few pixels.
-const SMALLEST: usize = 16;
-
-/// Least period that can be asked for, in pixels.
-const LEAST_PERIOD: f64 = 2.0;
+pub use params::{ExtractParams, PeriodSource, Scaling, WangParams};
+use period::colors;
+use prepare::{Prepared, prepare};
 
 /// Longest side of a cell of the contact sheet, in pixels.
 const SHOWN: usize = 384;
@@ -40,9 +37,6 @@ const SHOWN: usize = 384;
 /// Patch side of the band, at most and at least.
 const MOST_PATCH: usize = 11;
 const LEAST_PATCH: usize = 5;
-
-/// Side of a lean that is no lean, in pixels over a tile.
-const UPRIGHT: f64 = 0.1;
 
 /// Where a photo's period was found.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -92,8 +86,8 @@ pub struct ExtractReport {
 pub struct ExtractedTile {
     /// The tile, in the photo's own sample type.
     pub picture: Picture,
-    /// Where it lies in the scaled photo, and how good it is there, in squared CIE L*a*b* units. Of
-    /// the tile as cut out: a band is made anew after that.
+    /// Where it lies in the scaled photo, and how good it is there, in CIE L*a*b* units, squared unless
+    /// the similarity is absolute. Of the tile as cut out: a band is made anew after that.
     pub place: Place,
     /// Where its upper left corner lies in the photo as it is: pixels to the right and downwards.
     pub photo_place: [f64; 2],
@@ -130,20 +124,26 @@ impl Extraction {
         SourceMap::new(size, (th, tw), yx.collect())?.apply(picture, MapKind::Color)
     }
 
+    /// How tile `i` was made, for its file: JSON that holds nothing that differs between equal runs.
+    pub(crate) fn record(&self, i: usize) -> String {
+        let report = &self.report;
+        let params = typed_params(&ExtractParams::schema(), &report.params);
+        let mut record = record_of(ExtractParams::VERB, report.version, report.seed, &params);
+        record["period"] = json!(report.period.sides);
+        record["scale"] = json!(report.scale);
+        record["photo_place"] = json!(self.tiles[i].photo_place);
+        record.to_string()
+    }
+
     /// Another map of the photo's material, of any resolution, cut at the places of the tiles: their
     /// size and the map's own type.
     ///
     /// # Errors
     /// [`Error::SizeMismatch`] if the map has another aspect ratio than the photo.
     pub fn tiles_of(&self, map: &Picture, kind: MapKind) -> Result<Vec<Picture>> {
-        if self.frame.is_plain() {
-            return self.tiles.iter().map(|tile| tile.map.apply(map, kind)).collect();
-        }
-        // One pixel is gathered: the rules are those of the source map.
-        let (width, height) = self.report.photo_size;
-        SourceMap::new((1, 1), (height, width), vec![[0, 0]])?.apply(map, kind)?;
-        let read = self.frame.read(map, kind)?;
-        self.tiles.iter().map(|tile| tile.map.apply(&read, kind)).collect()
+        map_in(&self.frame, self.report.photo_size, map, kind, |read| {
+            self.tiles.iter().map(|tile| tile.map.apply(read, kind)).collect()
+        })
     }
 
     /// All tiles over all their tilings in one picture, 8 bits a sample, the best on the left.
@@ -184,27 +184,14 @@ pub fn extract(
     mask: Option<&Mask>,
     params: &ExtractParams,
 ) -> Result<Extraction> {
-    check(photo, params)?;
     let start = Instant::now();
-    let mut notes = Vec::new();
-    let mask = usable(photo, mask)?;
-    ctx.begin(lattice::STEPS + representative::STEPS);
-    let flat = flattened(ctx, photo, mask.as_ref(), params, &mut notes)?;
-    let photo = flat.as_ref().unwrap_or(photo);
-
-    let found = ctx.install(|| find_period(ctx, photo, mask.as_ref(), params))?;
-    let size = (photo.height(), photo.width());
-    let (frame, tile) = framed(size, found.sides, params)?;
-    let scale = [frame.unit()[0], frame.unit()[1]].map(|v| dot(v, v).sqrt().recip());
-    notes.extend(described(&found, &frame, tile, scale));
+    let Prepared { found, frame, tile, scale, scaled, flags, mut notes } =
+        prepare(ctx, photo, mask, params, representative::STEPS)?;
     let analysis = start.elapsed();
 
-    let (scaled, flags, costs) = ctx.install(|| {
-        let scaled = frame.read(photo, MapKind::Color)?;
-        let flags = frame.usable(mask.as_ref());
+    let costs = ctx.install(|| {
         let codes = Codes::new(&colors(&scaled), frame.size(), flags.clone());
-        let costs = Costs::new(ctx, &codes, tile)?;
-        Ok((scaled, flags, costs))
+        Costs::new(ctx, &codes, tile, params.similarity)
     })?;
     let positions = costs.count();
     if positions == 0 {
@@ -234,10 +221,10 @@ pub fn extract(
         version: env!("CARGO_PKG_VERSION"),
         seed: ctx.seed,
         params: params.show(),
-        photo_size: (size.1, size.0),
+        photo_size: (photo.width(), photo.height()),
         period: found,
         tile_size: (tile.1, tile.0),
-        scale: (scale[0], scale[1]),
+        scale,
         scaled_size: (frame.size().1, frame.size().0),
         alpha,
         beta: weights.1,
@@ -252,100 +239,20 @@ pub fn extract(
     Ok(Extraction { tiles, report, frame })
 }
 
-/// Checks everything that can be known before the work.
-fn check(photo: &Picture, params: &ExtractParams) -> Result<()> {
-    params.validate()?;
-    if let Some(alpha) = params.alpha.filter(|alpha| !(alpha.is_finite() && *alpha >= 0.0)) {
-        return Err(Error::parameter("alpha", "none, or a number from 0 up", alpha));
-    }
-    flatten::check_reach(params.flatten)?;
-    let (width, height) = (photo.width(), photo.height());
-    if width.min(height) < SMALLEST {
-        let (what, remedy) = ("the photo".into(), "take a larger piece of it".into());
-        return Err(Error::TooSmall { what, width, height, need: SMALLEST, remedy });
-    }
-    if let PeriodSource::Pixels { width: w, height: h } = params.period {
-        let fits = |period: f64, side: usize| (LEAST_PERIOD..=side as f64 / 2.0).contains(&period);
-        if !fits(w, width) || !fits(h, height) {
-            let expected = format!(
-                "{LEAST_PERIOD}x{LEAST_PERIOD} to {}x{}, half the photo, so that it repeats at least twice",
-                width as f64 / 2.0,
-                height as f64 / 2.0
-            );
-            return Err(Error::parameter("period", expected, params.period.show()));
-        }
-    }
-    photo.ensure_finite("the photo")?;
-    // Linear light of the photo, the scaled photo's, its samples, colours, codes and costs; the
-    // lattice's planes.
-    let (pixels, channels) = ((width * height) as u64, photo.channels() as u64);
-    let work = pixels * (8 * channels + 100) + photo.byte_len() as u64 + 600 * pixels.min(1 << 20);
-    let tiles = params.count as u64 * pixels / 4 * (12 + photo.byte_len() as u64 / pixels);
-    ensure_available(
-        &format!("extracting tiles from a {width}x{height} photo"),
-        work.checked_add(tiles),
-    )
-}
-
-/// Where the photo may be used; `None` is everywhere.
-fn usable(photo: &Picture, mask: Option<&Mask>) -> Result<Option<Mask>> {
-    if let Some(mask) = mask {
-        mask.ensure_size("the mask", photo.height(), photo.width())?;
-    }
-    let both = match (mask, Mask::from_alpha(photo)) {
-        (Some(mask), Some(alpha)) => Some(mask.and(&alpha)?),
-        (mask, alpha) => mask.cloned().or(alpha),
-    };
-    Ok(both.filter(|mask| mask.count() < mask.usable().len()))
-}
-
-fn flattened(
-    ctx: &Ctx,
-    photo: &Picture,
-    mask: Option<&Mask>,
-    params: &ExtractParams,
-    notes: &mut Vec<String>,
-) -> Result<Option<Picture>> {
-    if params.flatten <= 0.0 {
-        return Ok(None);
-    }
-    let sigma = f64::from(params.flatten) * photo.height().min(photo.width()) as f64;
-    let flat = ctx.install(|| flatten::run(photo, mask, sigma))?;
-    notes.push(flat.note(sigma));
-    Ok(Some(flat.picture))
-}
-
-/// What was found and done, for people.
-fn described(
-    found: &FoundPeriod,
+/// What is gathered from another map of the photo (width, height) as the photo was read.
+fn map_in<T>(
     frame: &Frame,
-    (tile_h, tile_w): (usize, usize),
-    scale: [f64; 2],
-) -> Vec<String> {
-    let [a, b] = found.sides;
-    let mut notes = Vec::new();
-    if let Some(confidence) = found.confidence {
-        let by = if found.by == "ssd" { "difference from itself" } else { "lattice" };
-        notes.push(format!(
-            "the photo repeats every {:.2} pixels to the right and {:.2} downwards (found by its {by}, \
-             confidence {confidence:.2})",
-            a[0], b[1]
-        ));
+    (width, height): (usize, usize),
+    map: &Picture,
+    kind: MapKind,
+    gather: impl FnOnce(&Picture) -> Result<T>,
+) -> Result<T> {
+    if frame.is_plain() {
+        return gather(map);
     }
-    if !frame.is_plain() {
-        let leans = a[1].abs().max(b[0].abs()) > UPRIGHT;
-        let upright = if leans {
-            format!(" and put upright (it leaned by {:.1} and {:.1} pixels)", a[1], b[0])
-        } else {
-            String::new()
-        };
-        notes.push(format!(
-            "the photo was scaled by {:.4} across and {:.4} down{upright}, so that a tile is {tile_w}x{tile_h} \
-             whole pixels",
-            scale[0], scale[1]
-        ));
-    }
-    notes
+    // One pixel is gathered: the rules are those of the source map.
+    SourceMap::new((1, 1), (height, width), vec![[0, 0]])?.apply(map, kind)?;
+    gather(&frame.read(map, kind)?)
 }
 
 /// Cuts the tiles out at their places, and makes their border anew if that is asked for.

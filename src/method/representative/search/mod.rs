@@ -1,9 +1,12 @@
 //! What a tile at every position would cost, and the best positions.
 
+mod unlike;
+
 use rayon::prelude::*;
 
 use crate::base::ctx::Ctx;
 use crate::base::error::Result;
+use crate::base::params::choice;
 
 /// Largest code. A difference squared and summed over three channels is below 2^28, so a sum over all
 /// pairs of 2^32 pixels fits 64 bits.
@@ -11,6 +14,33 @@ const MOST: f32 = 8191.0;
 
 /// Steps of progress that [`Costs::new`] counts.
 pub const STEPS: u64 = 3;
+
+choice! {
+    /// How a difference of two colours counts.
+    pub enum Similarity {
+        /// Squared, as in the paper: the best tile is near the mean of the picture's periods.
+        Squared = "squared",
+        /// As it is: near the median, which a few things that are elsewhere in no period do not move.
+        Absolute = "absolute",
+    }
+}
+
+impl Similarity {
+    /// The difference of two colours, summed over the channels.
+    #[inline]
+    fn apart(self, a: [i16; 3], b: [i16; 3]) -> u64 {
+        let one = |k: usize| {
+            let d = u64::from(a[k].abs_diff(b[k]));
+            if self == Self::Squared { d * d } else { d }
+        };
+        (0..3).map(one).sum()
+    }
+
+    /// What a difference of one code is worth if a code is worth `step`.
+    fn unit(self, step: f64) -> f64 {
+        if self == Self::Squared { step * step } else { step }
+    }
+}
 
 /// The colours of a picture as integers: all sums are exact, whatever their order.
 #[derive(Debug, Clone)]
@@ -76,9 +106,9 @@ pub struct Place {
     pub y: usize,
     /// Its column.
     pub x: usize,
-    /// The mean squared difference of the pixels that meet where tiles do: h(T).
+    /// The mean difference of the pixels that meet where tiles do, squared or absolute: h(T).
     pub continuity: f64,
-    /// The mean squared difference of the picture and the tiling: `SSDN(I, I_T)`.
+    /// The mean difference of the picture and the tiling, likewise: `SSDN(I, I_T)` if squared.
     pub resemblance: f64,
     /// alpha h + beta SSDN.
     pub score: f64,
@@ -93,7 +123,7 @@ pub struct Costs {
     tile: (usize, usize),
     /// c(T) of eq. 5, in codes; `NOWHERE` where the tile would hold a pixel that is not usable.
     seams: Vec<u64>,
-    /// The squared differences of the picture and the tiling, summed, in codes.
+    /// The differences of the picture and the tiling, summed, in codes.
     unlike: Vec<u64>,
     /// From those sums to means in the units of the pixels.
     per_seam: f64,
@@ -109,9 +139,8 @@ impl Costs {
     /// Of tiles of size `tile` (height, width) anywhere in the picture.
     ///
     /// A tile holds one pixel of each residue class modulo its size, wherever it lies, and its tiling
-    /// has that pixel at all places of the class. So what the pixel q adds to the difference is known
-    /// before any tile is: the sum over its class of (I(p) - I(q))^2 = S2 - 2 I(q) S1 + n I(q)^2,
-    /// and a tile's difference is the sum over its box.
+    /// has that pixel at all places of the class. So what a pixel adds to the difference is known
+    /// before any tile is, and a tile's difference is the sum over its box.
     ///
     /// # Paper
     /// Sec. 4.1, eq. 5, and sec. 4.2, with p = 1. Pixels that are not usable are not compared.
@@ -120,14 +149,20 @@ impl Costs {
     /// Integers: exact.
     ///
     /// # Cost
-    /// Linear in the pixels, whatever the size of the tile; about 56 bytes a pixel.
+    /// Linear in the pixels, whatever the size of the tile (absolute: times the logarithm of the number
+    /// of periods); about 64 bytes a pixel.
     ///
     /// # Errors
     /// [`Error::Cancelled`](crate::Error::Cancelled).
     ///
     /// # Panics
     /// If the tile is empty or larger than the picture.
-    pub fn new(ctx: &Ctx, codes: &Codes, tile: (usize, usize)) -> Result<Self> {
+    pub fn new(
+        ctx: &Ctx,
+        codes: &Codes,
+        tile: (usize, usize),
+        similarity: Similarity,
+    ) -> Result<Self> {
         let (h, w) = (codes.height, codes.width);
         let (th, tw) = tile;
         assert!((1..=h).contains(&th) && (1..=w).contains(&tw), "a {tw}x{th} tile of {w}x{h}");
@@ -135,14 +170,12 @@ impl Costs {
         let boxed = |value: &(dyn Fn(usize, usize) -> u64 + Sync)| {
             box_sums(&integral(value, (h, w)), w, (rows, cols), tile)
         };
-        let classes = classes(codes, tile);
+        let of_pixels = unlike::of_pixels(codes, tile, similarity);
         ctx.step(1)?;
-        let unlike = boxed(&|y, x| {
-            let i = y * w + x;
-            if codes.is_usable(i) { classes[y % th * tw + x % tw].cost(codes.pixels[i]) } else { 0 }
-        });
+        let unlike = boxed(&|y, x| of_pixels[y * w + x]);
+        drop(of_pixels);
         ctx.step(1)?;
-        let mut seams = seams(codes, (rows, cols), tile);
+        let mut seams = seams(codes, (rows, cols), tile, similarity);
         if let Some(usable) = &codes.usable {
             let holes = boxed(&|y, x| u64::from(!usable[y * w + x]));
             seams.iter_mut().zip(holes).filter(|(_, holes)| *holes > 0).for_each(|(seam, _)| {
@@ -151,7 +184,7 @@ impl Costs {
         }
         ctx.step(1)?;
         let count = (0..h * w).filter(|&i| codes.is_usable(i)).count();
-        let unit = codes.step * codes.step;
+        let unit = similarity.unit(codes.step);
         let per_seam = unit / (2 * (tw + th - 1)) as f64;
         let per_unlike = unit / count.max(1) as f64;
         Ok(Self { rows, cols, tile, seams, unlike, per_seam, per_unlike })
@@ -255,50 +288,6 @@ impl Costs {
     }
 }
 
-/// The usable pixels that lie whole tiles apart.
-#[derive(Debug, Clone, Copy, Default)]
-struct Class {
-    n: i64,
-    sum: [i64; 3],
-    /// Of all channels.
-    squares: i64,
-}
-
-impl Class {
-    /// The squared differences of all its pixels from a colour.
-    #[inline]
-    fn cost(&self, px: [i16; 3]) -> u64 {
-        let px = px.map(i64::from);
-        let product: i64 = (0..3).map(|k| px[k] * self.sum[k]).sum();
-        let square: i64 = (0..3).map(|k| px[k] * px[k]).sum();
-        (self.squares - 2 * product + self.n * square) as u64
-    }
-}
-
-fn classes(codes: &Codes, (th, tw): (usize, usize)) -> Vec<Class> {
-    let (h, w) = (codes.height, codes.width);
-    let mut classes = vec![Class::default(); th * tw];
-    classes.par_chunks_mut(tw).enumerate().for_each(|(r, classes)| {
-        for y in (r..h).step_by(th) {
-            for left in (0..w).step_by(tw) {
-                let at = y * w + left;
-                let pixels = &codes.pixels[at..at + tw.min(w - left)];
-                for (k, (class, px)) in classes.iter_mut().zip(pixels).enumerate() {
-                    if codes.is_usable(at + k) {
-                        class.n += 1;
-                        for (sum, &v) in class.sum.iter_mut().zip(px) {
-                            let v = i64::from(v);
-                            *sum += v;
-                            class.squares += v * v;
-                        }
-                    }
-                }
-            }
-        }
-    });
-    classes
-}
-
 /// Sums over all pixels above and to the left, a row and a column more than the picture. They may run
 /// over; differences of them do not, as long as what they stand for fits.
 fn integral(value: &(dyn Fn(usize, usize) -> u64 + Sync), (h, w): (usize, usize)) -> Vec<u64> {
@@ -342,12 +331,14 @@ fn box_sums(
 }
 
 /// c(T) of eq. 5 at every position: the first column against the last, the first row against the last.
-fn seams(codes: &Codes, (rows, cols): (usize, usize), (th, tw): (usize, usize)) -> Vec<u64> {
+fn seams(
+    codes: &Codes,
+    (rows, cols): (usize, usize),
+    (th, tw): (usize, usize),
+    similarity: Similarity,
+) -> Vec<u64> {
     let (h, w) = (codes.height, codes.width);
-    let apart = |i: usize, j: usize| -> u64 {
-        let (a, b) = (codes.pixels[i], codes.pixels[j]);
-        (0..3).map(|k| (i64::from(a[k]) - i64::from(b[k])).pow(2) as u64).sum()
-    };
+    let apart = |i: usize, j: usize| similarity.apart(codes.pixels[i], codes.pixels[j]);
     // Sums over the rows above, of the difference between a pixel and the one a tile to its right.
     let mut upright = vec![0u64; (h + 1) * cols];
     upright[cols..].par_chunks_mut(cols).enumerate().for_each(|(y, row)| {

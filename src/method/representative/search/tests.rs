@@ -4,6 +4,8 @@ use super::*;
 use crate::base::rng::Rng;
 use proptest::prelude::*;
 
+const BOTH: [Similarity; 2] = [Similarity::Squared, Similarity::Absolute];
+
 fn ctx(threads: usize) -> Ctx {
     Ctx::new(0, threads).expect("pool")
 }
@@ -18,11 +20,17 @@ fn random(h: usize, w: usize, masked: u32, seed: u64) -> Codes {
 }
 
 /// By definition: h from the tile's pixels, SSDN from the tiling that is really built.
-fn naive(codes: &Codes, (th, tw): (usize, usize), (ty, tx): (usize, usize)) -> Option<[u64; 2]> {
+fn naive(
+    codes: &Codes,
+    (th, tw): (usize, usize),
+    (ty, tx): (usize, usize),
+    similarity: Similarity,
+) -> Option<[u64; 2]> {
     let (h, w) = (codes.height, codes.width);
     let tile = |y: usize, x: usize| codes.pixels[(ty + y) * w + tx + x];
     let apart = |a: [i16; 3], b: [i16; 3]| -> u64 {
-        (0..3).map(|k| (i64::from(a[k]) - i64::from(b[k])).pow(2) as u64).sum()
+        let power = if similarity == Similarity::Squared { 2 } else { 1 };
+        (0..3).map(|k| (i64::from(a[k]) - i64::from(b[k])).unsigned_abs().pow(power)).sum()
     };
     if (0..th * tw).any(|i| !codes.is_usable((ty + i / tw) * w + tx + i % tw)) {
         return None;
@@ -38,12 +46,12 @@ fn naive(codes: &Codes, (th, tw): (usize, usize), (ty, tx): (usize, usize)) -> O
     Some([seam, unlike])
 }
 
-fn ensure_as_defined(codes: &Codes, tile: (usize, usize)) {
-    let costs = Costs::new(&ctx(2), codes, tile).expect("costs");
+fn ensure_as_defined(codes: &Codes, tile: (usize, usize), similarity: Similarity) {
+    let costs = Costs::new(&ctx(2), codes, tile, similarity).expect("costs");
     for i in 0..costs.rows * costs.cols {
         let got = [costs.seams[i], costs.unlike[i]];
         let at = (i / costs.cols, i % costs.cols);
-        match naive(codes, tile, at) {
+        match naive(codes, tile, at, similarity) {
             Some(want) => assert_eq!(got, want, "{tile:?} at {at:?}"),
             None => assert_eq!(got[0], NOWHERE, "{tile:?} at {at:?}"),
         }
@@ -59,7 +67,9 @@ proptest! {
         masked in 0..12_u32,
         seed: u64,
     ) {
-        ensure_as_defined(&random(h, w, masked, seed), (th.min(h), tw.min(w)));
+        for similarity in BOTH {
+            ensure_as_defined(&random(h, w, masked, seed), (th.min(h), tw.min(w)), similarity);
+        }
     }
 
     #[test]
@@ -68,22 +78,23 @@ proptest! {
         (th, tw) in (2..8_usize, 2..8_usize),
         masked in 0..8_u32,
         (alpha, keep, overlap) in (0..4_u32, 1..11_u32, 0..5_u32),
+        similarity in prop::sample::select(&BOTH[..]),
         seed: u64,
     ) {
         let codes = random(h, w, masked, seed);
         let tile @ (th, tw) = (th.min(h), tw.min(w));
-        let costs = Costs::new(&ctx(2), &codes, tile).expect("costs");
+        let costs = Costs::new(&ctx(2), &codes, tile, similarity).expect("costs");
         let (keep, overlap) = (f64::from(keep) / 10.0, f64::from(overlap) / 4.0);
         let got = costs.best((f64::from(alpha), 1.0), keep, overlap, 5);
         // All by the definition, sorted.
         let places = (0..(h - th + 1) * (w - tw + 1)).map(|i| (i / (w - tw + 1), i % (w - tw + 1)));
         let n = (0..h * w).filter(|&i| codes.is_usable(i)).count() as f64;
         let mut all: Vec<_> = places
-            .filter_map(|at| naive(&codes, tile, at).map(|[seam, unlike]| (seam, unlike, at)))
+            .filter_map(|at| naive(&codes, tile, at, similarity).map(|[seam, unlike]| (seam, unlike, at)))
             .collect();
         all.sort_unstable_by_key(|&(seam, _, at)| (seam, at));
         all.truncate(((all.len() as f64 * keep).ceil() as usize).max(1));
-        let unit = codes.step() * codes.step();
+        let unit = similarity.unit(codes.step());
         let score = |&(seam, unlike, _): &(u64, u64, (usize, usize))| {
             let h = seam as f64 * (unit / (2 * (tw + th - 1)) as f64);
             f64::from(alpha) * h + unlike as f64 * (unit / n)
@@ -123,9 +134,11 @@ fn a_periodic_picture_costs_nothing_and_the_first_place_is_taken() {
     let pixels: Vec<[f32; 3]> =
         (0..23 * 40).map(|i| cell.pixels[i / 40 % 5 * 7 + i % 40 % 7].map(f32::from)).collect();
     let codes = Codes::new(&pixels, (23, 40), None);
-    let costs = Costs::new(&ctx(1), &codes, (5, 7)).expect("costs");
-    assert!(costs.unlike.iter().all(|&v| v == 0));
-    let best = costs.best((0.0, 1.0), 1.0, 0.0, 100);
-    assert_eq!((best[0].y, best[0].x), (0, 0));
-    assert_eq!(best.len(), 4 * 5, "as many as fit side by side");
+    for similarity in BOTH {
+        let costs = Costs::new(&ctx(1), &codes, (5, 7), similarity).expect("costs");
+        assert!(costs.unlike.iter().all(|&v| v == 0));
+        let best = costs.best((0.0, 1.0), 1.0, 0.0, 100);
+        assert_eq!((best[0].y, best[0].x), (0, 0));
+        assert_eq!(best.len(), 4 * 5, "as many as fit side by side");
+    }
 }
