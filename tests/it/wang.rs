@@ -146,7 +146,7 @@ mod sets {
     fn what_cannot_be_made_is_said_in_a_sentence() {
         let photo = cloth((60, 75), (12, 15), 50);
         let error = |params: &WangParams| {
-            wang(&ctx(1), &photo, None, params).err().expect("refused").to_string()
+            wang(&ctx(1), &photo, None, params).expect_err("refused").to_string()
         };
         let text = error(&WangParams { periods: 4, ..given(15.0, 12.0) });
         assert!(text.contains("no room for four usable pieces of 60x48 pixels"), "{text}");
@@ -229,7 +229,7 @@ mod program {
         let before = std::fs::read(folder.at("out/plane.png")).expect("plane");
         folder.refuses(&args, 1, "exists already");
         for name in ["atlas.png", "plane.png", "index.png", "tile_01.png"] {
-            std::fs::remove_file(folder.at(&format!("out/{name}"))).expect("removed");
+            std::fs::remove_file(folder.at(format!("out/{name}"))).expect("removed");
         }
         folder.refuses(&args, 1, "exists already");
         assert_eq!(count(&folder, "out"), 8);

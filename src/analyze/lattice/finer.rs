@@ -108,7 +108,7 @@ mod tests {
         let (h, w) = (240, 260);
         let shade = |row: usize, column: usize| {
             let mut rng = Rng::new(seed, 0, row as u32, column as u64);
-            let side = if (row + column) % 2 == 0 { turns } else { -turns };
+            let side = if (row + column).is_multiple_of(2) { turns } else { -turns };
             1.0 + side + 0.4 * f64::from(rng.below(1000)) / 1000.0
         };
         let value = |i: usize| {
