@@ -3,8 +3,8 @@
 use super::Candidate;
 use super::field::Field;
 use super::pairs::{goodness, multiples};
-use super::refine::fitted;
-use crate::signal::basis::{Basis, combined, reduced};
+use super::refine::{fitted, peak};
+use crate::signal::basis::{Basis, Vector, combined, dot, reduced};
 
 /// How many times as many points a finer lattice has; others come step by step.
 const TIMES: [u8; 4] = [2, 3, 5, 7];
@@ -17,18 +17,31 @@ const CHANCE: f64 = 2.3;
 /// that differ much among themselves prove nothing.
 const SHARE: f64 = 0.6;
 
+/// A peak is looked for this far around where it should be, in pixels.
+const NEAR: isize = 2;
+
 /// The lattice, or the finest that contains it and whose further points agree as well, but for chance.
 ///
 /// Bricks of random colours agree by chance a little more at some displacements than at others. The best
 /// of all pairs are then two of those, of a lattice that has only every third brick, say, although the
 /// others agree as well as bricks of such colours can. Where cells differ in turns, as the fields of a
 /// chessboard do, the points between agree less, and all alike.
-pub(super) fn finest(field: &Field, candidate: Candidate) -> Candidate {
+///
+/// Vectors of the finer lattice are `shortest` at least, and peaks: next to a wide one all agrees.
+pub(super) fn finest(field: &Field, candidate: Candidate, shortest: f64) -> Candidate {
     let mut found = candidate;
+    let is_peak = |v: Vector| {
+        let Some((top, _)) = peak(field, v, NEAR) else { return false };
+        let off = [top[0] - v[0], top[1] - v[1]];
+        dot(v, v) >= shortest * shortest && dot(off, off) <= 1.0
+    };
     let finer = |of: Candidate| {
         let all = TIMES.into_iter().flat_map(|times| containing(of.basis, times));
         all.filter_map(|basis| {
             let basis = fitted(field, reduced(basis));
+            if !basis.into_iter().all(is_peak) {
+                return None;
+            }
             let finer = goodness(field, basis, None, &mut Vec::new())?;
             agrees(field, of.basis, basis).then_some(finer)
         })
@@ -120,7 +133,7 @@ mod tests {
 
     fn found(field: &Field, basis: Basis) -> Basis {
         let candidate = goodness(field, basis, None, &mut Vec::new()).expect("it repeats");
-        finest(field, candidate).basis
+        finest(field, candidate, 3.0).basis
     }
 
     #[test]
@@ -161,6 +174,19 @@ mod tests {
                 assert!((area(basis) - 144.0).abs() < 3.0, "seed {seed}: {basis:?}");
             }
         }
+    }
+
+    /// Soft discs, whose correlation is wide.
+    #[test]
+    fn places_next_to_a_peak_are_no_points_between() {
+        let (h, w) = (240, 260);
+        let value = |i: usize| {
+            let wave = |v: usize| (v as f64 * std::f64::consts::TAU / 40.0).cos();
+            (wave(i / w) + wave(i % w)).exp() as f32
+        };
+        let field = Field::new(&Autocorrelation::new(&[(0..h * w).map(value).collect()], (h, w)));
+        let basis = found(&field, [[40.0, 0.0], [0.0, 40.0]]);
+        assert!((area(basis) - 1600.0).abs() < 30.0, "{basis:?}");
     }
 
     #[test]

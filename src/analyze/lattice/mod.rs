@@ -113,7 +113,7 @@ pub fn find(
                 .map(|candidate| refine::improved(&field, candidate))
                 .reduce(|a, b| if b.goodness > a.goodness { b } else { a });
             if let Some(found) = found {
-                let mut found = finer::finest(&field, found);
+                let mut found = finer::finest(&field, found, shortest);
                 found.strength /= signal_share(&gamma).max(FAINTEST);
                 found.basis = scaled(found.basis, scale.map(f64::recip));
                 let stronger = |c: Candidate| {

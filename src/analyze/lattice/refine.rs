@@ -64,7 +64,7 @@ pub(super) fn improved(field: &Field, candidate: Candidate) -> Candidate {
 }
 
 /// The highest correlation within `near` of a displacement, if it is a local maximum, and its value.
-fn peak(field: &Field, at: [f64; 2], near: isize) -> Option<([f64; 2], f64)> {
+pub(super) fn peak(field: &Field, at: [f64; 2], near: isize) -> Option<([f64; 2], f64)> {
     let (x0, y0) = (at[0].round() as isize, at[1].round() as isize);
     let margin = (near + 1) as f64;
     if !field.covers([at[0].abs() + margin, at[1].abs() + margin]) {
