@@ -176,19 +176,6 @@ mod tests {
         }
     }
 
-    /// Soft discs, whose correlation is wide.
-    #[test]
-    fn places_next_to_a_peak_are_no_points_between() {
-        let (h, w) = (240, 260);
-        let value = |i: usize| {
-            let wave = |v: usize| (v as f64 * std::f64::consts::TAU / 40.0).cos();
-            (wave(i / w) + wave(i % w)).exp() as f32
-        };
-        let field = Field::new(&Autocorrelation::new(&[(0..h * w).map(value).collect()], (h, w)));
-        let basis = found(&field, [[40.0, 0.0], [0.0, 40.0]]);
-        assert!((area(basis) - 1600.0).abs() < 30.0, "{basis:?}");
-    }
-
     #[test]
     fn a_chessboard_keeps_its_two_colors() {
         for seed in 0..3 {
