@@ -99,6 +99,53 @@ fn rows_of_bricks_are_not_taken_for_the_lattice() {
     assert!(got.found && same(&got, [[36.0, 0.0], [18.0, 14.0]], 0.5), "{got:?}");
 }
 
+/// Fields of `basis`, each of a random color that `turns` raises, with joints between.
+fn fields(basis: Basis, seed: u64, joints: f64, turns: impl Fn(i64, i64) -> f64) -> Picture {
+    let mut grain = Rng::new(seed, 1, 0, 0);
+    let [[a, b], [c, d]] = basis;
+    let det = a * d - b * c;
+    let sample = |i: usize| {
+        let (y, x, channel) = ((i / 3 / 400) as f64, (i / 3 % 400) as f64, i % 3);
+        let (u, v) = ((x * d - y * c) / det, (y * a - x * b) / det);
+        let (column, row) = (u.floor() as i64, v.floor() as i64);
+        let inside = |t: f64, length: f64| (t - t.floor()) * length > 3.0;
+        let mut rng = Rng::new(seed, 2 + channel as u32, column as u32, row as u64);
+        let stone = 80.0 + 60.0 * uniform(&mut rng) + turns(column, row);
+        let joint = !(inside(u, a.hypot(b)) && inside(v, c.hypot(d)));
+        let value = if joint { joints } else { stone } + 8.0 * uniform(&mut grain);
+        value.clamp(0.0, 255.0) as u8
+    };
+    let samples = Samples::U8((0..360 * 400 * 3).map(sample).collect());
+    Picture::new(360, 400, 3, samples, Encoding::Srgb).expect("valid")
+}
+
+#[test]
+fn stones_of_random_colors_lie_on_the_lattice_of_their_joints() {
+    // The joints are as light as the stones on average: of the colors nothing repeats.
+    for (seed, basis) in (0..).zip([
+        [[40.3, 0.0], [0.0, 24.7]],
+        [[38.4, 0.0], [19.2, 17.3]],
+        [[26.1, 4.0], [-5.2, 30.6]],
+    ]) {
+        let got = detect(&fields(basis, seed, 110.0, |_, _| 0.0));
+        assert!(got.found && same(&got, basis, 0.5), "{basis:?}: {got:?}");
+    }
+}
+
+#[test]
+fn fields_of_two_colors_in_turns_are_a_cell_of_two() {
+    let basis = [[30.2, 1.0], [-1.4, 28.6]];
+    let two = [[30.2 - 1.4, 29.6], [30.2 + 1.4, 1.0 - 28.6]];
+    for seed in 0..2 {
+        let board = |column: i64, row: i64| if (column + row) % 2 == 0 { 70.0 } else { 0.0 };
+        let got = detect(&fields(basis, seed, 0.0, board));
+        assert!(got.found && same(&got, two, 0.5), "{got:?}");
+        let rows = |_, row: i64| if row.rem_euclid(3) == 0 { 70.0 } else { 0.0 };
+        let got = detect(&fields(basis, seed, 0.0, rows));
+        assert!(got.found && same(&got, [basis[0], [-4.2, 85.8]], 0.7), "{got:?}");
+    }
+}
+
 #[test]
 fn gradients_stains_and_scratches_do_not_matter() {
     let basis = BASES[3];

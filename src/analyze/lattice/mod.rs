@@ -1,11 +1,14 @@
 //! The lattice of a near-regular picture.
 
+mod decide;
 pub mod drift;
+mod edges;
 mod field;
 mod finer;
 mod pairs;
 mod refine;
 pub mod snap;
+mod turns;
 
 use rayon::prelude::*;
 
@@ -13,10 +16,13 @@ use crate::base::ctx::Ctx;
 use crate::base::error::Result;
 use crate::image::mask::Mask;
 use crate::signal::autocorrelation::Autocorrelation;
-use crate::signal::basis::{Basis, reduced};
+use crate::signal::basis::Basis;
 use crate::signal::lowpass::LowPass;
 use crate::signal::resample::{resized, resized_mask};
+use decide::{Look, decided};
+use edges::Edges;
 use field::Field;
+use turns::Cells;
 
 /// Square roots of the areas, in pixels, to which the picture is reduced. Large patterns are found
 /// where they are small: there grain is averaged away, and a pattern that bends still overlaps with
@@ -47,6 +53,16 @@ const GLANCE: f64 = 0.08;
 /// the file format's blocks.
 const FAINTEST: f64 = 0.2;
 
+/// The root of the area to which the picture is reduced for its edges.
+const EDGES: f64 = SIDES[1];
+
+/// [`FAINTEST`] of edges: those of noise are everywhere. Measured: drawn wood grain, made up for by more,
+/// has a confidence of 0.6.
+const EDGES_FAINTEST: f64 = 0.5;
+
+/// Shortest vector of the lattice of the edges, in their pixels: nearer, an edge correlates with itself.
+const EDGES_SHORTEST: f64 = 8.0;
+
 /// A candidate lattice and how well the picture repeats by it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Candidate {
@@ -69,19 +85,20 @@ pub struct Found {
     pub confidence: f64,
     /// What candidates were compared by; never negative.
     pub goodness: f64,
-    /// The mean autocorrelation at the lattice's displacements, in -1..=1.
+    /// The mean autocorrelation at the lattice's displacements, of the colors or of the edges: where it was
+    /// found; in -1..=1.
     pub correlation: f64,
 }
 
 /// Steps of progress that [`find`] counts.
-pub const STEPS: u64 = SIDES.len() as u64;
+pub const STEPS: u64 = SIDES.len() as u64 + 2;
 
-/// The best lattice of a picture (`pixels`, `height` x `width`, of which `usable` count); `None` if
-/// there is no candidate at all. Periods shorter than `min_period` pixels do not count. `hurried`, it
+/// The best lattice of a picture (`pixels`, `height` x `width`, of which `usable` count), by its colors and
+/// by its edges; `None` if there is no candidate at all. Periods shorter than `min_period` pixels do not count. `hurried`, it
 /// gives up after the coarsest scale if hardly anything repeats there.
 ///
 /// # Paper
-/// See `pairs::goodness` for what is compared.
+/// See `pairs::goodness` for what is compared. The edges are past the paper: see `decide`.
 ///
 /// # Errors
 /// [`Error::Cancelled`](crate::Error::Cancelled).
@@ -93,10 +110,67 @@ pub fn find(
     min_period: f64,
     hurried: bool,
 ) -> Result<Option<Found>> {
+    let size = (height, width);
+    let colors = strongest(
+        ctx,
+        &Scan { pixels, size, usable, min_period, sides: &SIDES, faintest: FAINTEST, hurried },
+    )?;
+    let reduced = reduced_size(size, EDGES);
+    let scale = [reduced.1 as f64 / width as f64, reduced.0 as f64 / height as f64];
+    let least = min_period * (scale[0] * scale[1]).sqrt();
+    let weak = colors.as_ref().is_none_or(|look| look.candidate.strength < GLANCE);
+    // A fine pattern that is to be left out would be there in the edges all the same.
+    if hurried && weak || least > EDGES_SHORTEST {
+        return Ok(colors.map(|look| look.found()));
+    }
+    let edges = Edges::new(pixels, size, usable, reduced)?;
+    let looked = strongest(
+        ctx,
+        &Scan {
+            pixels: &edges.pixels,
+            size: reduced,
+            usable: edges.usable.as_ref(),
+            min_period: EDGES_SHORTEST,
+            sides: &SIDES[..2],
+            faintest: EDGES_FAINTEST,
+            hurried: false,
+        },
+    )?;
+    let looked = looked.map(|look| look.within(scale));
+    let (Some(colors), Some(looked)) = (&colors, &looked) else {
+        return Ok(colors.or(looked).map(|look| look.found()));
+    };
+    let planes = normalized(pixels, size, usable, reduced);
+    let small = usable.map(|mask| resized_mask(mask.usable(), size, reduced));
+    Ok(Some(decided(colors, looked, |basis| {
+        Cells::new(&planes, reduced, small.as_deref(), scaled(basis, scale))
+    })))
+}
+
+/// A picture, and how a lattice is looked for in it.
+struct Scan<'a> {
+    pixels: &'a [[f32; 3]],
+    /// Height and width.
+    size: (usize, usize),
+    usable: Option<&'a Mask>,
+    /// Shortest vector, in pixels.
+    min_period: f64,
+    /// Square roots of the areas to which it is reduced.
+    sides: &'static [f64],
+    /// See [`FAINTEST`].
+    faintest: f64,
+    /// Whether to give up after the coarsest scale if hardly anything repeats there.
+    hurried: bool,
+}
+
+/// The strongest lattice of all scales.
+fn strongest(ctx: &Ctx, scan: &Scan) -> Result<Option<Look>> {
+    let Scan { pixels, size: (height, width), usable, min_period, sides, faintest, hurried } =
+        *scan;
     let mut chosen: Option<Candidate> = None;
     let mut finest = None;
     let mut last = (0, 0);
-    for side in SIDES {
+    for &side in sides {
         let size = reduced_size((height, width), side);
         if size != last {
             last = size;
@@ -114,7 +188,7 @@ pub fn find(
                 .reduce(|a, b| if b.goodness > a.goodness { b } else { a });
             if let Some(found) = found {
                 let mut found = finer::finest(&field, found, shortest);
-                found.strength /= signal_share(&gamma).max(FAINTEST);
+                found.strength /= signal_share(&gamma).max(faintest);
                 found.basis = scaled(found.basis, scale.map(f64::recip));
                 let stronger = |c: Candidate| {
                     found.strength > c.strength * if c.strength < EVEN { 1.0 } else { FINER }
@@ -130,16 +204,7 @@ pub fn find(
             break;
         }
     }
-    Ok(chosen.zip(finest).map(|(found, (field, scale))| {
-        let basis = refine::sharpened(&field, found.basis, scale).unwrap_or(found.basis);
-        let cube = (found.strength / EVEN).powi(3);
-        Found {
-            basis: reduced(basis),
-            confidence: cube / (1.0 + cube),
-            goodness: found.goodness,
-            correlation: found.correlation,
-        }
-    }))
+    Ok(chosen.zip(finest).map(|(candidate, (field, scale))| Look { candidate, field, scale }))
 }
 
 /// The share of a picture's variance that is not white noise, in 0..=1: the correlation at no displacement, were it
