@@ -68,7 +68,7 @@ pub fn run(photo: &Picture, usable: Option<&Mask>, sigma: f64) -> Result<Flat> {
     let usable = usable.map(Mask::usable);
     let counts = |i: usize| usable.is_none_or(|u| u[i]);
     let pixels = model.averaging_pixels(photo);
-    let low = LowPass::new(&pixels, (h, w), usable, sigma);
+    let low = LowPass::new(|i| pixels[i], (h, w), usable, sigma);
     // Sums row by row, and the rows in order: the same for any number of threads.
     let means = |value: &(dyn Fn(usize) -> [f64; 3] + Sync), n: f64| -> [f64; 3] {
         let row = |y: usize| {
@@ -84,34 +84,43 @@ pub fn run(photo: &Picture, usable: Option<&Mask>, sigma: f64) -> Result<Flat> {
     let n = (0..h * w).filter(|&i| counts(i)).count().max(1) as f64;
     let mean = means(&|i| pixels[i].map(f64::from), n);
     // What light is multiplied by, before the means are what they were.
-    let mut gains = vec![[1.0; 3]; h * w];
+    let mut gains = vec![[0.0; 3]; h * w];
     gains.par_chunks_mut(w).enumerate().for_each(|(y, gains)| {
-        let low = low.row(y);
-        for (x, gain) in gains.iter_mut().enumerate() {
-            let Some(low) = low.at(x) else { continue };
-            for k in (0..3).filter(|&k| mean[k] > 0.0) {
-                gain[k] = mean[k] / low[k].clamp(mean[k] / LIMIT, mean[k] * LIMIT);
-            }
-        }
+        low.row(y, |x, low| {
+            gains[x] = low.map_or([1.0; 3], |low| {
+                let gain = |k: usize| mean[k] / low[k].clamp(mean[k] / LIMIT, mean[k] * LIMIT);
+                std::array::from_fn(|k| if mean[k] > 0.0 { gain(k) } else { 1.0 })
+            });
+        });
     });
     let flat_mean = means(&|i| std::array::from_fn(|k| f64::from(pixels[i][k]) * gains[i][k]), n);
     let keep: [f64; 3] =
         std::array::from_fn(|k| if flat_mean[k] > 0.0 { mean[k] / flat_mean[k] } else { 1.0 });
-    gains.par_iter_mut().for_each(|gain| (0..3).for_each(|k| gain[k] *= keep[k]));
+    // The least and the largest of each channel, where the picture counts.
+    let kept = |(y, gains): (usize, &mut [[f64; 3]])| {
+        let (mut least, mut largest) = ([f64::MAX; 3], [0.0; 3]);
+        for (x, gain) in gains.iter_mut().enumerate() {
+            let counts = counts(y * w + x);
+            for k in 0..3 {
+                gain[k] *= keep[k];
+                if counts {
+                    least[k] = if gain[k] < least[k] { gain[k] } else { least[k] };
+                    largest[k] = if gain[k] > largest[k] { gain[k] } else { largest[k] };
+                }
+            }
+        }
+        (least, largest)
+    };
+    let ends: Vec<([f64; 3], [f64; 3])> = gains.par_chunks_mut(w).enumerate().map(kept).collect();
+    let factors = (
+        ends.iter().flat_map(|row| row.0).fold(f64::MAX, f64::min),
+        ends.iter().flat_map(|row| row.1).fold(0.0, f64::max),
+    );
 
     let alpha = photo.alpha_channel();
     let curve = (photo.encoding == Encoding::Srgb).then(SrgbTables::get);
     let (samples, clipped) =
         with_samples!(photo.samples(), v => multiplied(v, (w, c), alpha, curve, &gains, &counts));
-    let range = |i: usize| {
-        let ends = |(low, high): (f64, f64), &g: &f64| (low.min(g), high.max(g));
-        gains[i].iter().fold((f64::MAX, 0.0), ends)
-    };
-    let factors = (0..h * w)
-        .into_par_iter()
-        .filter(|&i| counts(i))
-        .map(range)
-        .reduce(|| (f64::MAX, 0.0), |a, b| (a.0.min(b.0), a.1.max(b.1)));
     let colors = c - usize::from(alpha.is_some());
     let picture = photo.with_samples(h, w, c, samples)?;
     Ok(Flat { picture, factors, clipped: clipped as f64 / (n * colors as f64) })

@@ -24,13 +24,15 @@ pub struct LowPass {
     side: usize,
     rows: usize,
     cols: usize,
+    /// Of the picture, in pixels.
+    width: usize,
     /// One value a cell, at its middle; `None` where no usable pixel is in reach.
     cells: Vec<Option<[f64; 3]>>,
 }
 
 impl LowPass {
-    /// Of `pixels` (`height` x `width`), where `usable` (`None`: everywhere), with a window of
-    /// standard deviation `sigma` pixels.
+    /// Of the picture (`height` x `width`) whose pixels, row by row, are those of `pixel`, where `usable`
+    /// (`None`: everywhere), with a window of standard deviation `sigma` pixels. Each is asked for once.
     ///
     /// # Cost
     /// Linear in the pixels and independent of `sigma`: the window slides over cells of a quarter
@@ -39,12 +41,11 @@ impl LowPass {
     /// # Determinism
     /// Same bytes for any thread count.
     pub fn new(
-        pixels: &[[f32; 3]],
+        pixel: impl Fn(usize) -> [f32; 3] + Sync,
         (height, width): (usize, usize),
         usable: Option<&[bool]>,
         sigma: f64,
     ) -> Self {
-        assert_eq!(pixels.len(), height * width, "pixels do not fill the picture");
         let side = ((sigma / CELLS) as usize).max(1);
         let (rows, cols) = (height.div_ceil(side), width.div_ceil(side));
         let cell = |i: usize| {
@@ -53,7 +54,7 @@ impl LowPass {
             for y in y0..(y0 + side).min(height) {
                 for x in x0..(x0 + side).min(width) {
                     if usable.is_none_or(|u| u[y * width + x]) {
-                        let [a, b, c] = pixels[y * width + x].map(f64::from);
+                        let [a, b, c] = pixel(y * width + x).map(f64::from);
                         n += 1.0;
                         let terms = [y as f64, x as f64, a, b, c];
                         sum.iter_mut().zip(terms).for_each(|(sum, v)| *sum += v);
@@ -79,45 +80,36 @@ impl LowPass {
             let middle = 0.5 - 0.5 / side as f64;
             fitted(m, (i / cols) as f64 + middle, (i % cols) as f64 + middle, spread)
         };
-        Self { side, rows, cols, cells: blurred.par_iter().enumerate().map(fit).collect() }
+        Self { side, rows, cols, width, cells: blurred.par_iter().enumerate().map(fit).collect() }
     }
 
-    /// The values of a row of pixels.
-    pub fn row(&self, y: usize) -> LowPassRow {
+    /// Calls `each` with the columns of a row of pixels and the values there; `None` where no usable pixel is
+    /// in reach.
+    pub fn row(&self, y: usize, mut each: impl FnMut(usize, Option<[f64; 3]>)) {
         let inverse = 1.0 / self.side as f64;
-        let (y0, y1, t) = place(y, self.rows, inverse);
-        let line = |y: usize| &self.cells[y * self.cols..][..self.cols];
-        let cells =
-            line(y0).iter().zip(line(y1)).map(|(a, b)| Some(between((*a)?, (*b)?, t))).collect();
-        LowPassRow { cells, inverse }
+        // The cells before and after, and where between their middles it lies; beyond the outermost the line goes on.
+        let at = (y as f64 + 0.5) * inverse - 0.5;
+        let low = at.clamp(0.0, self.rows.saturating_sub(2) as f64) as usize;
+        let line = |y: usize| &self.cells[y.min(self.rows - 1) * self.cols..][..self.cols];
+        let t = at - low as f64;
+        let cells: Vec<Option<[f64; 3]>> = line(low)
+            .iter()
+            .zip(line(low + 1))
+            .map(|(a, b)| Some(between((*a)?, (*b)?, t)))
+            .collect();
+        let last = self.cols.saturating_sub(2);
+        let mut from = 0;
+        for low in 0..=last {
+            let ends = cells[low].zip(cells[(low + 1).min(self.cols - 1)]);
+            // Up to the middle of the cell after.
+            let to = if low == last { self.width } else { ((2 * low + 3) * self.side).div_ceil(2) };
+            for x in from..to {
+                let t = (x as f64 + 0.5) * inverse - 0.5 - low as f64;
+                each(x, ends.map(|(a, b)| between(a, b, t)));
+            }
+            from = to;
+        }
     }
-}
-
-/// The low frequencies of a row of pixels.
-#[derive(Debug)]
-pub struct LowPassRow {
-    /// Between those above and below.
-    cells: Vec<Option<[f64; 3]>>,
-    /// Cells to a pixel.
-    inverse: f64,
-}
-
-impl LowPassRow {
-    /// The value at pixel `x`; `None` if no usable pixel is in reach.
-    #[inline]
-    pub fn at(&self, x: usize) -> Option<[f64; 3]> {
-        let (x0, x1, t) = place(x, self.cells.len(), self.inverse);
-        Some(between(self.cells[x0]?, self.cells[x1]?, t))
-    }
-}
-
-/// The cells before and after pixel `p`, and where between their middles it lies; beyond the outermost the
-/// line goes on.
-#[inline]
-fn place(p: usize, n: usize, inverse: f64) -> (usize, usize, f64) {
-    let at = (p as f64 + 0.5) * inverse - 0.5;
-    let low = at.clamp(0.0, n.saturating_sub(2) as f64) as usize;
-    (low, (low + 1).min(n - 1), at - low as f64)
 }
 
 #[inline]
@@ -163,6 +155,15 @@ fn fitted(m: &Moments, y: f64, x: f64, spread: f64) -> Option<[f64; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn at(low: &LowPass, y: usize, x: usize) -> Option<[f64; 3]> {
+        let mut row = Vec::new();
+        low.row(y, |x, value| {
+            assert_eq!(x, row.len());
+            row.push(value);
+        });
+        row[x]
+    }
 
     /// By definition: every pixel looks at all pixels in reach of the window and fits its plane.
     fn naive(
@@ -214,9 +215,9 @@ mod tests {
             (0..h * w).map(|i| std::array::from_fn(|k| value(i, k))).collect();
         let usable = holes(h, w);
         for sigma in [4.0, 9.0, 17.0] {
-            let low = LowPass::new(&pixels, (h, w), Some(&usable), sigma);
+            let low = LowPass::new(|i| pixels[i], (h, w), Some(&usable), sigma);
             for (y, x) in [(0, 0), (3, 58), (20, 15), (25, 30), (49, 60), (14, 9)] {
-                let got = low.row(y).at(x).expect("in reach");
+                let got = at(&low, y, x).expect("in reach");
                 let want = naive(&pixels, (h, w), &usable, sigma, (y, x)).expect("in reach");
                 for k in 0..3 {
                     let off = (got[k] - want[k]).abs();
@@ -231,16 +232,16 @@ mod tests {
         let (h, w) = (50, 61);
         let slope = |y: usize, x: usize| 0.2 + 0.01 * y as f64 - 0.003 * x as f64;
         let pixels: Vec<[f32; 3]> = (0..h * w).map(|i| [slope(i / w, i % w) as f32; 3]).collect();
-        let low = LowPass::new(&pixels, (h, w), Some(&holes(h, w)), 12.0);
+        let low = LowPass::new(|i| pixels[i], (h, w), Some(&holes(h, w)), 12.0);
         for i in 0..h * w {
-            let off = low.row(i / w).at(i % w).expect("in reach")[1] - slope(i / w, i % w);
+            let off = at(&low, i / w, i % w).expect("in reach")[1] - slope(i / w, i % w);
             assert!(off.abs() < 1e-5, "at {}, {}: {off}", i / w, i % w);
         }
     }
 
     #[test]
     fn nothing_usable_gives_nothing() {
-        let low = LowPass::new(&[[1.0; 3]; 64], (8, 8), Some(&[false; 64]), 2.0);
-        assert!(low.row(3).at(3).is_none());
+        let low = LowPass::new(|_| [1.0; 3], (8, 8), Some(&[false; 64]), 2.0);
+        assert!(at(&low, 3, 3).is_none());
     }
 }

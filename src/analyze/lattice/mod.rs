@@ -10,6 +10,8 @@ mod refine;
 pub mod snap;
 mod turns;
 
+use std::borrow::Cow;
+
 use rayon::prelude::*;
 
 use crate::base::ctx::Ctx;
@@ -228,44 +230,49 @@ pub fn normalized(
     usable: Option<&Mask>,
     size: (usize, usize),
 ) -> Vec<Vec<f32>> {
-    let small = resized(pixels, from, size);
+    let small = if from == size { Cow::from(pixels) } else { resized(pixels, from, size).into() };
     let usable = usable.map(|mask| resized_mask(mask.usable(), from, size));
     let ok = |i: usize| usable.as_ref().is_none_or(|u| u[i]);
     let sigma = WINDOW * size.0.min(size.1) as f64;
-    let mean = LowPass::new(&small, size, usable.as_deref(), sigma);
-    let mut centered = small;
+    let mean = LowPass::new(|i| small[i], size, usable.as_deref(), sigma);
+    let mut centered = vec![[0.0f32; 3]; small.len()];
     centered.par_chunks_mut(size.1).enumerate().for_each(|(y, row)| {
-        let mean = mean.row(y);
-        for (x, px) in row.iter_mut().enumerate() {
-            *px = match mean.at(x) {
-                Some(mean) if ok(y * size.1 + x) => {
-                    std::array::from_fn(|k| (f64::from(px[k]) - mean[k]) as f32)
-                }
-                _ => [0.0; 3],
-            };
-        }
+        mean.row(y, |x, mean| {
+            let i = y * size.1 + x;
+            if let Some(mean) = mean
+                && ok(i)
+            {
+                row[x] = std::array::from_fn(|k| (f64::from(small[i][k]) - mean[k]) as f32);
+            }
+        });
     });
-    let power: Vec<[f32; 3]> =
-        centered.par_iter().map(|d| [d.iter().map(|v| v * v).sum(), 0.0, 0.0]).collect();
-    let count = (0..power.len()).filter(|&i| ok(i)).count().max(1);
-    let whole = power.iter().map(|p| f64::from(p[0])).sum::<f64>() / count as f64;
+    let power = |px: &[f32; 3]| px.iter().map(|v| v * v).sum::<f32>();
+    let count = (0..small.len()).filter(|&i| ok(i)).count().max(1);
+    // Row by row: the same sum on any number of threads.
+    let row = |row: &[[f32; 3]]| row.iter().map(|px| f64::from(power(px))).sum();
+    let rows: Vec<f64> = centered.par_chunks(size.1).map(row).collect();
+    let whole = rows.iter().sum::<f64>() / count as f64;
     let floor = FAINT * FAINT * whole;
-    let local = LowPass::new(&power, size, usable.as_deref(), sigma);
+    let local = LowPass::new(|i| [power(&centered[i]), 0.0, 0.0], size, usable.as_deref(), sigma);
     let mut even = centered;
-    even.par_chunks_mut(size.1).enumerate().for_each(|(y, row)| {
-        let local = local.row(y);
-        for (x, px) in row.iter_mut().enumerate() {
-            let power = local.at(x).map_or(0.0, |p| p[0]).max(floor);
+    let squares = |(y, row): (usize, &mut [[f32; 3]])| {
+        let mut squares = [0.0; 3];
+        local.row(y, |x, local| {
+            let power = local.map_or(0.0, |p| p[0]).max(floor);
             let factor = if power > 0.0 { power.sqrt().recip() } else { 0.0 };
-            *px = px.map(|v| (f64::from(v) * factor) as f32);
-        }
-    });
-    let planes = (0..3).map(|k| even.iter().map(|px| px[k]).collect::<Vec<f32>>());
-    let energy = |plane: &[f32]| plane.iter().map(|&v| f64::from(v).powi(2)).sum::<f64>();
-    let energies: Vec<f64> = planes.clone().map(|plane| energy(&plane)).collect();
+            for (v, sum) in row[x].iter_mut().zip(&mut squares) {
+                *v = (f64::from(*v) * factor) as f32;
+                *sum += f64::from(*v).powi(2);
+            }
+        });
+        squares
+    };
+    let rows: Vec<[f64; 3]> = even.par_chunks_mut(size.1).enumerate().map(squares).collect();
+    let energies = [0, 1, 2].map(|k| rows.iter().map(|row| row[k]).sum::<f64>());
     let least = 1e-6 * energies.iter().sum::<f64>();
     // Grey pictures have one plane, not two more of rounding.
-    planes.zip(&energies).filter(|(_, e)| **e > least).map(|(plane, _)| plane).collect()
+    let planes: Vec<usize> = (0..3).filter(|&k| energies[k] > least).collect();
+    planes.into_par_iter().map(|k| even.iter().map(|px| px[k]).collect()).collect()
 }
 
 /// Height and width of the picture reduced to an area of `side` squared; itself if it is smaller.

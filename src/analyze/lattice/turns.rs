@@ -62,18 +62,21 @@ impl Cells {
         let length = parts[0] * parts[1] * planes.len();
         let mut sums = vec![0.0; count[0] * count[1] * length];
         let mut weights = vec![0.0; count[0] * count[1] * parts[0] * parts[1]];
+        let across = coefficients(basis, [1.0, 0.0]);
         for y in 0..h {
+            let first = coefficients(basis, [0.5, y as f64 + 0.5]);
             for x in 0..w {
                 let i = y * w + x;
                 if usable.is_some_and(|u| !u[i]) {
                     continue;
                 }
-                let c = coefficients(basis, [x as f64 + 0.5, y as f64 + 0.5]);
-                let [a, b] = [0, 1].map(|k| (c[k] - least[k]).max(0.0));
-                let cell =
-                    (a as usize).min(count[0] - 1) * count[1] + (b as usize).min(count[1] - 1);
-                let part = |v: f64, n: usize| ((v.fract() * n as f64) as usize).min(n - 1);
-                let part = part(a, parts[0]) * parts[1] + part(b, parts[1]);
+                // Along a vector the index of the cell, and of the part in it.
+                let [a, b] = [0, 1].map(|k| {
+                    let at = (first[k] + across[k] * x as f64 - least[k]).max(0.0);
+                    let cell = (at as usize).min(count[k] - 1);
+                    (cell, (((at - cell as f64) * parts[k] as f64) as usize).min(parts[k] - 1))
+                });
+                let (cell, part) = (a.0 * count[1] + b.0, a.1 * parts[1] + b.1);
                 weights[cell * parts[0] * parts[1] + part] += 1.0;
                 for (k, plane) in planes.iter().enumerate() {
                     sums[cell * length + part * planes.len() + k] += f64::from(plane[i]);
@@ -107,8 +110,9 @@ impl Cells {
     /// multiples of the cells'. `None` if a group has fewer than two cells.
     ///
     /// An analysis of variance. Under chance the ratio of variances is about that of two chi-squared
-    /// variables, with as many degrees of freedom a cell as the cells have dimensions (Satterthwaite).
-    fn explained(&self, coarser: [[i32; 2]; 2]) -> Option<Share> {
+    /// variables, with as many degrees of freedom a cell as the cells have dimensions (Satterthwaite). To
+    /// count these takes longer than all else, and is left out where the share is below `least`.
+    fn explained(&self, coarser: [[i32; 2]; 2], least: f64) -> Option<Share> {
         let [[p, q], [r, s]] = coarser;
         let times = (p * s - q * r).abs();
         // Coefficients of the coarser lattice times `times`, of which whole multiples are nothing.
@@ -140,6 +144,10 @@ impl Cells {
         if within <= 0.0 {
             return None;
         }
+        let explained = (between - (k - 1.0) * within) / (total + within);
+        if explained < least {
+            return Some(Share { explained, deviations: 0.0 });
+        }
         let rest: Vec<f64> = self
             .at
             .iter()
@@ -153,15 +161,13 @@ impl Cells {
         let dimensions = dimensions(&rest, self.length);
         let ratio = between / (k - 1.0) / within;
         let spread = (2.0 / dimensions * (1.0 / (k - 1.0) + 1.0 / (n - k))).sqrt();
-        Some(Share {
-            explained: (between - (k - 1.0) * within) / (total + within),
-            deviations: (ratio - 1.0) / spread,
-        })
+        Some(Share { explained, deviations: (ratio - 1.0) / spread })
     }
 
     /// Whether the cells differ in turns by the groups of `coarser`; `None` if they are too few to say.
     pub(super) fn differ(&self, coarser: [[i32; 2]; 2]) -> Option<bool> {
-        let share = self.explained(coarser)?;
+        let least = SURE.explained.min(LIKELY.explained);
+        let share = self.explained(coarser, least)?;
         Some(share.reaches(LIKELY) || share.reaches(SURE))
     }
 
@@ -171,7 +177,7 @@ impl Cells {
             .into_iter()
             .flat_map(|n| (0..n).map(move |b| [[n, 0], [b, 1]]).chain([[[1, 0], [0, n]]]));
         all.filter_map(|coarser| {
-            let share = self.explained(coarser)?;
+            let share = self.explained(coarser, SURE.explained)?;
             share.reaches(SURE).then_some((share.explained, coarser))
         })
         .reduce(|a, b| if b.0 > a.0 { b } else { a })
@@ -290,7 +296,7 @@ mod tests {
             }
             let error = within / (n as f64 - k);
             let want = (total - within - (k - 1.0) * error) / (total + error);
-            let got = cells.explained(coarser).expect("enough cells").explained;
+            let got = cells.explained(coarser, f64::MIN).expect("enough cells").explained;
             assert!((got - want).abs() < 1e-9, "{coarser:?}: {got}, not {want}");
         }
     }
@@ -298,7 +304,9 @@ mod tests {
     #[test]
     fn by_chance_cells_differ_by_a_few_deviations() {
         let all: Vec<Share> = (0..60)
-            .filter_map(|seed| drawn(seed, SLANTED, |_, _| 0.0).explained([[2, 0], [1, 1]]))
+            .filter_map(|seed| {
+                drawn(seed, SLANTED, |_, _| 0.0).explained([[2, 0], [1, 1]], f64::MIN)
+            })
             .collect();
         assert_eq!(all.len(), 60);
         let mean = all.iter().map(|s| s.deviations).sum::<f64>() / 60.0;
