@@ -45,7 +45,8 @@ pub struct Lattice {
     pub found: bool,
     /// The goodness by which candidates were compared, never negative.
     pub goodness: f64,
-    /// The mean autocorrelation at the lattice's displacements, in -1..=1.
+    /// The mean autocorrelation at the lattice's displacements, of the colors or of the edges: where the lattice
+    /// was found; in -1..=1.
     pub correlation: f64,
 }
 

@@ -78,6 +78,12 @@ fn coarser(basis: Basis, multiples: [[i32; 2]; 2]) -> Basis {
     reduced(multiples.map(|[a, b]| combined(basis, f64::from(a), f64::from(b))))
 }
 
+/// Whether a lattice has only every second, third or fourth point of a `finer` one.
+pub(super) fn is_part(basis: Basis, finer: Basis) -> bool {
+    multiples(finer, basis)
+        .is_some_and(|[[a, b], [c, d]]| (2..=MOST_TURNS).contains(&(a * d - b * c).abs()))
+}
+
 /// Which multiples of the vectors of `basis` those of another are; `None` if they are none.
 fn multiples(basis: Basis, other: Basis) -> Option<[[i32; 2]; 2]> {
     let exact = other.map(|v| coefficients(basis, v));

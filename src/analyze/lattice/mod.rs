@@ -21,7 +21,7 @@ use crate::signal::autocorrelation::Autocorrelation;
 use crate::signal::basis::Basis;
 use crate::signal::lowpass::LowPass;
 use crate::signal::resample::{resized, resized_mask};
-use decide::{Look, decided};
+use decide::{Look, decided, is_part};
 use edges::Edges;
 use field::Field;
 use turns::Cells;
@@ -39,7 +39,7 @@ const WINDOW: f64 = 0.1;
 const FAINT: f64 = 0.25;
 
 /// A lattice at a finer scale must be this much stronger than one at a coarser to be preferred: the
-/// weave of a cloth to its pattern.
+/// weave of a cloth to its pattern. Unless the coarser is but a part of it, whose vectors were too short there.
 const FINER: f64 = 1.35;
 
 /// Strength at which the confidence is a half. Measured: stochastic photographs reach 0.05 (0.07 in
@@ -192,10 +192,7 @@ fn strongest(ctx: &Ctx, scan: &Scan) -> Result<Option<Look>> {
                 let mut found = finer::finest(&field, found, shortest);
                 found.strength /= signal_share(&gamma).max(faintest);
                 found.basis = scaled(found.basis, scale.map(f64::recip));
-                let stronger = |c: Candidate| {
-                    found.strength > c.strength * if c.strength < EVEN { 1.0 } else { FINER }
-                };
-                if chosen.is_none_or(stronger) {
+                if chosen.is_none_or(|coarser| is_preferred(found, coarser)) {
                     chosen = Some(found);
                 }
             }
@@ -207,6 +204,12 @@ fn strongest(ctx: &Ctx, scan: &Scan) -> Result<Option<Look>> {
         }
     }
     Ok(chosen.zip(finest).map(|(candidate, (field, scale))| Look { candidate, field, scale }))
+}
+
+/// Whether a lattice that was found at a finer scale is taken instead of one at a coarser.
+fn is_preferred(finer: Candidate, coarser: Candidate) -> bool {
+    let any = coarser.strength < EVEN || is_part(coarser.basis, finer.basis);
+    finer.strength > coarser.strength * if any { 1.0 } else { FINER }
 }
 
 /// The share of a picture's variance that is not white noise, in 0..=1: the correlation at no displacement, were it
@@ -308,6 +311,24 @@ mod tests {
             if y.hypot(x) < 8.0 { 1.2 } else { -0.8 }
         };
         (0..SIZE.0 * SIZE.1).map(|i| (disc(i) + white()) as f32).collect()
+    }
+
+    #[test]
+    fn a_finer_scale_counts_if_it_is_much_stronger_or_has_the_rest_of_the_lattice() {
+        let candidate =
+            |basis, strength| Candidate { basis, strength, goodness: 0.0, correlation: 0.0 };
+        let coarser = candidate([[24.0, 0.0], [0.0, 14.0]], 0.30);
+        let weave = [[5.0, 2.0], [-2.0, 4.0]];
+        assert!(!is_preferred(candidate(weave, 0.39), coarser));
+        assert!(is_preferred(candidate(weave, 0.42), coarser));
+        assert!(!is_preferred(candidate(coarser.basis, 0.39), coarser));
+        for rest in [[[12.1, 0.0], [0.0, 14.0]], [[12.0, 7.1], [-12.0, 6.9]]] {
+            assert!(is_preferred(candidate(rest, 0.31), coarser), "{rest:?}");
+            assert!(!is_preferred(candidate(rest, 0.29), coarser), "{rest:?}");
+        }
+        // Some multiple of a much finer lattice is near any.
+        assert!(!is_preferred(candidate([[4.0, 0.0], [0.0, 7.0]], 0.31), coarser));
+        assert!(is_preferred(candidate(weave, 0.11), Candidate { strength: 0.10, ..coarser }));
     }
 
     #[test]
