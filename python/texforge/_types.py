@@ -356,15 +356,15 @@ class Lattice:
     goodness : float
         What candidates were compared by.
     correlation : float
-        The mean autocorrelation at the lattice's displacements, of the colors or of the edges: where
-        the lattice was found; -1 to 1.
+        The mean autocorrelation at the lattice's displacements, of the colors or of the edges:
+        where the lattice was found; -1 to 1.
     photo : (H, W) or (H, W, C) ndarray
         The photo.
     encoding : {"srgb", "linear", "data"}
         What its numbers mean.
     autocorrelation : (2h - 1, 2w - 1) ndarray of float32, or None
-        The generalized normalized autocorrelation of the photo's colors, reduced to h x w pixels with its
-        light evened out, if it was asked for: -1 to 1, no displacement in the middle.
+        The generalized normalized autocorrelation of the photo's colors, reduced to h x w pixels
+        with its light evened out, if it was asked for: -1 to 1, no displacement in the middle.
     autocorrelation_scale : (float, float) or None
         How many of its pixels are one of the photo, downwards and to the right.
     """
