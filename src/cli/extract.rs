@@ -11,12 +11,11 @@ use crate::base::error::{Error, Result};
 use crate::base::record::{Typed, typed_params};
 use crate::cli::maps::{self, Asked, Map};
 use crate::cli::show::duration;
-use crate::cli::small::{SCHEMA_VERSION, print_json};
+use crate::cli::small::{SCHEMA_VERSION, told};
 use crate::cli::sources::Sources;
 use crate::cli::summary::{Seconds, Written};
-use crate::cli::work::{Session, supervise};
-use crate::cli::{args, files};
-use crate::image::io::check_place;
+use crate::cli::work::Session;
+use crate::cli::{args, files, folder};
 use crate::image::mask::Mask;
 use crate::image::material::{MapKind, output_path};
 use crate::image::picture::Picture;
@@ -118,17 +117,10 @@ pub(super) fn run(matches: &ArgMatches) -> Result<()> {
         source_maps: matches.get_flag("save-source-maps"),
         force: matches.get_flag("force"),
     };
-    let folder = request.folder.clone();
-    let was_there = folder.exists();
     let (ctx, session) = Session::begin(matches)?;
-    let done = supervise(&session, move |session| work(session, &ctx, &request));
-    if done.is_err() && !was_there {
-        // Only if it is empty; the first error is the one to tell.
-        let _ = std::fs::remove_dir(&folder);
-    }
-    let (summary, lines) = done?;
-    lines.iter().for_each(|line| session.console.say(line));
-    if matches.get_flag("json") { print_json(&summary) } else { Ok(()) }
+    let folder = request.folder.clone();
+    let done = folder::filled(&folder, &session, move |session| work(session, &ctx, &request))?;
+    told(matches, &session, &done)
 }
 
 /// What a tile's files are called; the first is number 1.
@@ -171,35 +163,8 @@ impl Request {
         let mut inputs = self.inputs();
         inputs.extend(self.maps.paths());
         inputs.extend(maps.iter().flat_map(|m| &m.wanted.paths).map(PathBuf::as_path));
-        check_folder(folder, &files, &inputs, self.force)
+        folder::check(folder, &files, &inputs, self.force)
     }
-}
-
-/// Fails if the folder cannot be, or holds one of the files already.
-pub(super) fn check_folder(
-    folder: &Path,
-    files: &[PathBuf],
-    inputs: &[&Path],
-    force: bool,
-) -> Result<()> {
-    if folder == Path::new("-") {
-        return Err(Error::parameter("output", "a folder, as there are several files", "`-`"));
-    }
-    if !folder.exists() {
-        // What could be made here could be made in it.
-        return files::check_place(&folder.with_file_name(".texforge.png"), &[], true).map_err(
-            |error| match error {
-                Error::Io { action, source, .. } => {
-                    Error::Io { action, path: folder.to_owned(), source }
-                }
-                error => error,
-            },
-        );
-    }
-    if !folder.is_dir() {
-        return Err(Error::Exists { path: folder.to_owned() });
-    }
-    files.iter().try_for_each(|file| check_place(file, inputs, force))
 }
 
 fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Vec<String>)> {

@@ -8,6 +8,7 @@ mod args;
 mod exit;
 mod extract;
 mod files;
+mod folder;
 mod lattice;
 mod maps;
 mod noise;

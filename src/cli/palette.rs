@@ -10,7 +10,7 @@ use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
 use crate::cli::output::Target;
 use crate::cli::show::duration;
-use crate::cli::small::{SCHEMA_VERSION, print_json};
+use crate::cli::small::{SCHEMA_VERSION, told};
 use crate::cli::sources::Sources;
 use crate::cli::summary::{self, Written};
 use crate::cli::work::{Session, supervise};
@@ -114,9 +114,8 @@ pub(super) fn run(matches: &ArgMatches) -> Result<()> {
         force: matches.get_flag("force"),
     };
     let (ctx, session) = Session::begin(matches)?;
-    let (summary, lines) = supervise(&session, move |session| work(session, &ctx, &request))?;
-    lines.iter().for_each(|line| session.console.say(line));
-    if matches.get_flag("json") { print_json(&summary) } else { Ok(()) }
+    let done = supervise(&session, move |session| work(session, &ctx, &request))?;
+    told(matches, &session, &done)
 }
 
 fn work(session: &Session, ctx: &Ctx, request: &Request) -> Result<(Summary, Vec<String>)> {

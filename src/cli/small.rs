@@ -157,6 +157,19 @@ pub(super) fn man(matches: &ArgMatches) -> Result<()> {
     to_stdout(&text)
 }
 
+/// Says in `lines` what was done, and prints the summary if that was asked for.
+///
+/// # Errors
+/// As [`print_json`].
+pub(super) fn told(
+    matches: &ArgMatches,
+    session: &Session,
+    (summary, lines): &(impl serde::Serialize, Vec<String>),
+) -> Result<()> {
+    lines.iter().for_each(|line| session.console.say(line));
+    if matches.get_flag("json") { print_json(summary) } else { Ok(()) }
+}
+
 /// Writes one JSON object and a line break to standard output.
 pub(super) fn print_json(value: &impl serde::Serialize) -> Result<()> {
     let mut text = serde_json::to_vec_pretty(value)

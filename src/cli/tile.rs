@@ -8,7 +8,7 @@ use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
 use crate::cli::maps::{Asked, Map};
 use crate::cli::output::{Target, to_stdout};
-use crate::cli::small::print_json;
+use crate::cli::small::told;
 use crate::cli::sources::Sources;
 use crate::cli::summary::{self, Summary, Written};
 use crate::cli::work::{Session, supervise};
@@ -113,9 +113,8 @@ impl Place {
 pub(super) fn run(matches: &ArgMatches) -> Result<()> {
     let request = Request::typed(matches)?;
     let (ctx, session) = Session::begin(matches)?;
-    let (summary, lines) = supervise(&session, move |session| work(session, &ctx, &request))?;
-    lines.iter().for_each(|line| session.console.say(line));
-    if matches.get_flag("json") { print_json(&summary) } else { Ok(()) }
+    let done = supervise(&session, move |session| work(session, &ctx, &request))?;
+    told(matches, &session, &done)
 }
 
 impl Request {

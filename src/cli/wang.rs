@@ -9,14 +9,13 @@ use crate::base::ctx::Ctx;
 use crate::base::error::{Error, Result};
 use crate::base::params::Value as _;
 use crate::base::record::typed_params;
-use crate::cli::extract::check_folder;
 use crate::cli::maps::{self, Asked, Map};
 use crate::cli::show::duration;
-use crate::cli::small::{SCHEMA_VERSION, print_json};
+use crate::cli::small::{SCHEMA_VERSION, told};
 use crate::cli::sources::Sources;
 use crate::cli::summary::{Seconds, Written};
-use crate::cli::work::{Session, supervise};
-use crate::cli::{args, files};
+use crate::cli::work::Session;
+use crate::cli::{args, files, folder};
 use crate::image::mask::Mask;
 use crate::image::material::MapKind;
 use crate::image::picture::Picture;
@@ -93,17 +92,10 @@ pub(super) fn run(matches: &ArgMatches) -> Result<()> {
         maps: Asked::from(matches, 1)?,
         force: matches.get_flag("force"),
     };
-    let folder = request.folder.clone();
-    let was_there = folder.exists();
     let (ctx, session) = Session::begin(matches)?;
-    let done = supervise(&session, move |session| work(session, &ctx, &request));
-    if done.is_err() && !was_there {
-        // Only if it is empty; the first error is the one to tell.
-        let _ = std::fs::remove_dir(&folder);
-    }
-    let (summary, lines) = done?;
-    lines.iter().for_each(|line| session.console.say(line));
-    if matches.get_flag("json") { print_json(&summary) } else { Ok(()) }
+    let folder = request.folder.clone();
+    let done = folder::filled(&folder, &session, move |session| work(session, &ctx, &request))?;
+    told(matches, &session, &done)
 }
 
 impl Request {
@@ -127,7 +119,7 @@ impl Request {
         let mut inputs = self.inputs();
         inputs.extend(self.maps.paths());
         inputs.extend(maps.iter().flat_map(|m| &m.wanted.paths).map(PathBuf::as_path));
-        check_folder(&self.folder, &files, &inputs, self.force)
+        folder::check(&self.folder, &files, &inputs, self.force)
     }
 }
 

@@ -1,6 +1,6 @@
 //! `texforge noise export`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use clap::builder::PossibleValuesParser;
@@ -10,9 +10,9 @@ use serde_json::json;
 use super::{document, path, read};
 use crate::base::error::{Error, Result};
 use crate::base::params::Value as _;
-use crate::cli::args;
 use crate::cli::small::{SCHEMA_VERSION, print_json};
-use crate::cli::work::{Session, supervise, watch_signals};
+use crate::cli::work::{Session, watch_signals};
+use crate::cli::{args, folder};
 use crate::export::{ExportFile, Target, export};
 use crate::image::io::check_place;
 
@@ -87,19 +87,11 @@ pub(super) fn run(matches: &ArgMatches) -> Result<()> {
         force: matches.get_flag("force"),
         document,
     };
-    if request.folder == Path::new("-") {
-        let expected = "a folder, as there are several files";
-        return Err(Error::parameter("output", expected, "`-`"));
-    }
-    let (folder, was_there) = (request.folder.clone(), request.folder.exists());
+    folder::check(&request.folder, &[], &[], request.force)?;
     let session = Session::new(Arc::default(), matches.get_flag("quiet"));
     watch_signals();
-    let done = supervise(&session, move |session| work(session, &request));
-    if done.is_err() && !was_there {
-        // Only if it is empty; the first error is the one to tell.
-        let _ = std::fs::remove_dir(&folder);
-    }
-    let summary = done?;
+    let folder = request.folder.clone();
+    let summary = folder::filled(&folder, &session, move |session| work(session, &request))?;
     if matches.get_flag("json") { print_json(&summary) } else { Ok(()) }
 }
 
