@@ -69,7 +69,8 @@ macro_rules! integer_sample {
             }
             #[inline]
             fn from_unit(value: f64) -> Self {
-                (value * Self::SCALE + 0.5).floor().clamp(0.0, Self::SCALE) as $t
+                // What is not negative is rounded down as it becomes whole.
+                (value * Self::SCALE + 0.5).clamp(0.0, Self::SCALE) as $t
             }
             fn wrap(samples: Vec<Self>) -> Samples {
                 Samples::$variant(samples)

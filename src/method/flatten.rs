@@ -148,7 +148,7 @@ fn multiplied<T: Sample>(
                 };
                 let sample = T::from_unit(value);
                 // A half float has an end; hidden pixels may be anything.
-                if sample.to_unit().is_finite() {
+                if T::SCALE > 1.0 || sample.to_unit().is_finite() {
                     px[k] = sample;
                 }
                 clipped += usize::from(T::SCALE > 1.0 && value > 1.0 && counts(y * w + x));
