@@ -41,6 +41,7 @@ def regular(
     straighten: Straightening = "on",
     block: int | None = None,
     border: int | None = None,
+    sample_candidates: int = 1,
     candidates: int = 64,
     tolerance: int = 3,
     subpixel: Subpixel = "off",
@@ -87,6 +88,11 @@ def regular(
     border : int, optional
         How far pieces overlap with their neighbours, to either side, in pixels, 1 to half a block.
         By default 0.45 of a block.
+    sample_candidates : int
+        How many places are tried for each of the pieces that are drawn at random, 1 to 65536: of
+        these the one that agrees best with the random pieces around it is taken. 1 leaves it to
+        chance, as in the paper; 16 joins stones and panes of many sizes and colors better, and
+        mixes the photo a little less evenly.
     candidates : int
         How many pieces are tried for every gap, 1 to 65536.
     tolerance : int

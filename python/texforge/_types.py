@@ -192,6 +192,7 @@ class RegularOptions(TypedDict, total=False):
     straighten: Straightening
     block: int | None
     border: int | None
+    sample_candidates: int
     candidates: int
     tolerance: int
     subpixel: Subpixel

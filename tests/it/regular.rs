@@ -117,6 +117,55 @@ mod pixels {
     }
 
     #[test]
+    fn bricks_of_a_colour_come_to_lie_together() {
+        // The left half is dark, the right half bright.
+        let mut photo = straight();
+        let Samples::U8(v) = photo.samples() else { panic!("8 bits") };
+        let dark = |i: usize, v: u8| if i / 3 % 160 < 80 { v / 2 } else { v };
+        let samples = v.iter().enumerate().map(|(i, &v)| dark(i, v)).collect();
+        photo = Picture::new(144, 160, 3, Samples::U8(samples), Encoding::Srgb).expect("valid");
+        // How often a pixel and the next in its row or column are from different halves.
+        let changes = |sample_candidates: usize| {
+            let size = Size::Pixels { width: 400, height: 400 };
+            let made = made(&photo, &RegularParams { size, sample_candidates, ..params() });
+            let halves: Vec<bool> =
+                made.source_map.positions().iter().map(|&[_, x]| x < 80).collect();
+            let dark = halves.iter().filter(|&&dark| dark).count();
+            assert!((20_000..140_000).contains(&dark), "{sample_candidates}: {dark} dark");
+            let changes =
+                |step: usize| halves.windows(step + 1).filter(|w| w[0] != w[step]).count();
+            changes(1) + changes(400)
+        };
+        let (by_chance, agreeing) = (changes(1), changes(16));
+        assert!(5 * agreeing < 4 * by_chance, "{by_chance} became {agreeing}");
+    }
+
+    #[test]
+    fn a_rare_brick_does_not_die_out() {
+        // One of some 50 bricks is dark.
+        let mut photo = straight();
+        let Samples::U8(v) = photo.samples() else { panic!("8 bits") };
+        let is_dark = |y: usize, x: usize| (64..80).contains(&y) && (56..84).contains(&x);
+        let value = |i: usize, v: u8| if is_dark(i / 480, i / 3 % 160) { v / 4 } else { v };
+        let samples = v.iter().enumerate().map(|(i, &v)| value(i, v)).collect();
+        photo = Picture::new(144, 160, 3, Samples::U8(samples), Encoding::Srgb).expect("valid");
+        let share = |sample_candidates: usize| {
+            let size = Size::Pixels { width: 600, height: 600 };
+            let params = RegularParams { size, sample_candidates, ..params() };
+            let (mut dark, mut all) = (0, 0);
+            for seed in 0..8 {
+                let made = regular(&ctx(seed, 2), &photo, None, &params).expect("a texture");
+                let from = made.source_map.positions();
+                dark += from.iter().filter(|&&[y, x]| is_dark(y as usize, x as usize)).count();
+                all += from.len();
+            }
+            dark as f64 / all as f64
+        };
+        let (by_chance, agreeing) = (share(1), share(16));
+        assert!(2.0 * agreeing > by_chance, "{by_chance} became {agreeing}");
+    }
+
+    #[test]
     fn it_repeats_where_it_shall() {
         let photo = straight();
         for (tileable, width, height) in
@@ -276,7 +325,7 @@ mod sameness {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(8))]
         #[test]
-        fn strips_are_the_whole(seed in 0..99u64, seam in 0..3usize, height in 30..220usize, wraps: bool) {
+        fn strips_are_the_whole(seed in 0..99u64, seam in 0..3usize, height in 30..220usize, wraps: bool, agreeing: bool) {
             let photo = straight();
             let seam = [Seam::Graph, Seam::Cut, Seam::Linear][seam];
             let height = if wraps { height / 24 * 24 + 24 } else { height };
@@ -287,6 +336,7 @@ mod sameness {
                 block: OrAuto::Given(12),
                 border: OrAuto::Given(4),
                 feather: 1,
+                sample_candidates: if agreeing { 5 } else { 1 },
                 ..params()
             };
             let whole = regular(&ctx(seed, 1), &photo, None, &params).expect("a texture");

@@ -426,6 +426,7 @@ BAD: dict[str, dict[str, Any]] = {
     "block fraction": {"block": 30.5},
     "border zero": {"border": 0},
     "border more than half a block": {"block": 20, "border": 11},
+    "sample candidates": {"sample_candidates": 0},
     "candidates": {"candidates": 0},
     "candidates too many": {"candidates": 65537},
     "tolerance": {"tolerance": 65},

@@ -3,10 +3,11 @@
 
 mod deform;
 mod exemplar;
-mod gap;
+mod frame;
 mod grid;
 mod paint;
 mod places;
+mod sample;
 mod seam;
 mod subpixel;
 
@@ -21,10 +22,11 @@ use crate::image::interpolate::{PARTS, nearest};
 use crate::search::patchmatch::Wrap;
 use crate::signal::basis::Basis;
 pub use exemplar::Exemplar;
-use gap::Frame;
+use frame::Frame;
 use grid::{Axis, Block, Lenses, Side, is_sample, nearest_side};
 pub use paint::Strip;
 use places::{Offset, Places};
+use sample::Samples;
 
 /// How two patches are joined where they overlap.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -59,6 +61,9 @@ pub struct Plan {
     pub border: usize,
     /// The lattice in the photo, and in the output, where it may be a little stretched.
     pub lattices: [Basis; 2],
+    /// How many places on the lattice are tried for a sample: of these the one that agrees best with the
+    /// samples around it is taken. With 1 it is drawn, as in the paper.
+    pub sample_candidates: usize,
     /// How many places on the lattice are tried for a gap.
     pub candidates: usize,
     /// How far from its place on the lattice a gap's patch may lie.
@@ -86,7 +91,6 @@ struct Filled {
     shares: Vec<u8>,
 }
 
-const SAMPLE_STAGE: u32 = 0x5247_0001;
 const GAP_STAGE: u32 = 0x5247_0002;
 
 /// Everything that a run shares.
@@ -177,32 +181,21 @@ impl<'a> Mosaic<'a> {
         }
     }
 
-    /// Random sampling (paper, sec. 4.1).
-    fn sample(&self, ctx: &Ctx, block: Block) -> Result<Offset> {
-        let own = self.own(block);
-        let mut rng = rng(ctx, SAMPLE_STAGE, own);
-        let drawn = self.places.draw(&mut rng, self.middle(own), |o| self.fits(own, o, 0));
-        drawn.map(|offset| self.moved(own, block, offset)).ok_or_else(|| self.nowhere(own))
-    }
-
     /// The offsets of the samples around a gap, in the order of [`Side::ALL`].
-    fn around(&self, ctx: &Ctx, block: Block) -> Result<[Offset; 4]> {
-        let mut offsets = [[0; 2]; 4];
-        for (offset, side) in offsets.iter_mut().zip(Side::ALL) {
-            *offset = self.sample(ctx, side.beyond(block))?;
-        }
-        Ok(offsets)
+    fn around(&self, samples: &Samples, block: Block) -> [Offset; 4] {
+        Side::ALL.map(|side| samples.at(self, side.beyond(block)))
     }
 
     /// Gap filling (paper, sec. 4.2): the offset of the patch whose frame fits best.
-    fn fill(&self, ctx: &Ctx, block: Block) -> Result<Offset> {
+    fn fill(&self, ctx: &Ctx, samples: &Samples, block: Block) -> Result<Offset> {
         let lenses = self.lenses(block);
         let window = lenses.window();
         let image = &self.exemplar.image;
-        let corners = self.around(ctx, block)?.map(|o| self.window_at(block, o));
-        let frame = Frame::new(&lenses, |side, (y, x)| {
+        let corners = self.around(samples, block).map(|o| self.window_at(block, o));
+        let frame = Frame::new(window, |(y, x)| {
+            let (side, _) = lenses.at((y, x))?;
             let [wy, wx] = corners[side as usize];
-            image.pixel((nearest(wy) + y as i64) as usize, (nearest(wx) + x as i64) as usize)
+            Some(image.pixel((nearest(wy) + y as i64) as usize, (nearest(wx) + x as i64) as usize))
         });
         let mut rng = rng(ctx, GAP_STAGE, block);
         let (candidates, bend) = (self.plan.candidates, self.plan.deform);
@@ -210,7 +203,7 @@ impl<'a> Mosaic<'a> {
         let places = self.places.several(&mut rng, self.middle(block), candidates, fits);
         let places: Vec<Offset> = places.iter().map(|&o| self.window_at(block, o)).collect();
         let how = (ctx.simd, self.plan.matching);
-        let found = gap::nearest(how, image, &frame, &places, self.plan.tolerance, |place| {
+        let found = frame::nearest(how, image, &frame, &places, self.plan.tolerance, |place| {
             self.exemplar.fits(place, window, bend)
         });
         let mut found = found.ok_or_else(|| self.nowhere(block))?;
@@ -238,12 +231,13 @@ impl<'a> Mosaic<'a> {
     fn filled(
         &self,
         ctx: &Ctx,
+        samples: &Samples,
         blocks: &[(Block, Offset)],
         before: &BTreeMap<Block, Filled>,
     ) -> Result<Vec<(Block, Filled)>> {
         let one = |&(block, offset): &(Block, Offset)| {
             let (image, lenses) = (&self.exemplar.image, self.lenses(block));
-            let old = self.old(ctx, block, before)?;
+            let old = self.old(samples, block, before);
             let corner = self.window_at(block, offset).map(|v| v as i32);
             let places = deform::bent(image, &lenses, corner, &old, self.plan.deform);
             // The windows' rims are not the gap's, and stay so.
@@ -261,10 +255,10 @@ impl<'a> Mosaic<'a> {
     }
 
     /// What lies in a gap's window before the gap is joined: samples, and the gaps `before`.
-    fn old(&self, ctx: &Ctx, block: Block, before: &BTreeMap<Block, Filled>) -> Result<Vec<Place>> {
+    fn old(&self, samples: &Samples, block: Block, before: &BTreeMap<Block, Filled>) -> Vec<Place> {
         let lenses = self.lenses(block);
         let window = lenses.window();
-        let around = self.around(ctx, block)?;
+        let around = self.around(samples, block);
         let [wy, wx] = self.window(block);
         let beyond = |i: usize, n: usize| match i.checked_sub(lenses.border) {
             None => -1,
@@ -303,7 +297,7 @@ impl<'a> Mosaic<'a> {
                 }
             }
         }
-        Ok(old)
+        old
     }
 
     /// The rows of the output that some rows of blocks cover. All strips together are the whole, however
@@ -313,9 +307,10 @@ impl<'a> Mosaic<'a> {
     /// [`Error::BadPicture`] if nothing fits at some place, [`Error::Cancelled`].
     pub fn strip(&self, ctx: &Ctx, block_rows: std::ops::Range<usize>) -> Result<Strip> {
         let gaps = self.gaps(block_rows.clone());
+        let samples = self.samples(ctx, block_rows.clone(), &gaps)?;
         let offsets = gaps.par_iter().map(|&block| {
             let own = self.own(block);
-            let offset = self.moved(own, block, self.fill(ctx, own)?);
+            let offset = self.moved(own, block, self.fill(ctx, &samples, own)?);
             ctx.step(1)?;
             Ok((block, offset))
         });
@@ -326,11 +321,11 @@ impl<'a> Mosaic<'a> {
         first.retain(|([r, _], _)| r.rem_euclid(2) == 0);
         second.retain(|([r, _], _)| r.rem_euclid(2) == 1);
         let first: BTreeMap<Block, Filled> =
-            self.filled(ctx, &first, &BTreeMap::new())?.into_iter().collect();
+            self.filled(ctx, &samples, &first, &BTreeMap::new())?.into_iter().collect();
         let before = if self.plan.seam == Seam::Graph { &first } else { &BTreeMap::new() };
-        let second = self.filled(ctx, &second, before)?;
+        let second = self.filled(ctx, &samples, &second, before)?;
         let filled: Vec<(Block, Filled)> = first.into_iter().chain(second).collect();
-        self.painted(ctx, block_rows, &filled)
+        self.painted(ctx, block_rows, &samples, &filled)
     }
 }
 

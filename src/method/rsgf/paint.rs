@@ -6,6 +6,7 @@ use crate::base::ctx::Ctx;
 use crate::base::error::Result;
 use crate::image::interpolate::{Fraction, PARTS, fraction, nearest};
 use crate::method::rsgf::grid::{Block, is_sample, nearest_side};
+use crate::method::rsgf::sample::Samples;
 use crate::method::rsgf::{Filled, Mosaic, Seam};
 
 /// Some rows of the output.
@@ -30,6 +31,7 @@ impl Mosaic<'_> {
         &self,
         ctx: &Ctx,
         block_rows: std::ops::Range<usize>,
+        samples: &Samples,
         filled: &[(Block, Filled)],
     ) -> Result<Strip> {
         let (height, width) = self.plan.size;
@@ -54,7 +56,7 @@ impl Mosaic<'_> {
             let top = bottom(r) as i64;
             let rows = top..bottom(r + 1) as i64;
             for c in 0..self.columns.blocks as i64 {
-                self.paint_samples(ctx, [r, c], &rows, from)?;
+                self.paint_samples(samples, [r, c], &rows, from);
             }
             for (place, mixed) in from.iter().zip(mixed.iter_mut()) {
                 *mixed = unmixed(*place);
@@ -105,16 +107,16 @@ impl Mosaic<'_> {
     /// A block of one sample, or a gap's of the four around it as far as they reach.
     fn paint_samples(
         &self,
-        ctx: &Ctx,
+        samples: &Samples,
         block: Block,
         rows: &std::ops::Range<i64>,
         from: &mut [[u32; 2]],
-    ) -> Result<()> {
+    ) {
         let width = self.plan.size.1;
         let [y0, x0] = self.corner(block);
         let size = self.lenses(block).size;
-        let sample = is_sample(block).then(|| self.sample(ctx, block)).transpose()?;
-        let around = if sample.is_none() { self.around(ctx, block)? } else { [[0; 2]; 4] };
+        let sample = is_sample(block).then(|| samples.at(self, block));
+        let around = if sample.is_none() { self.around(samples, block) } else { [[0; 2]; 4] };
         for y in y0..(y0 + size.0 as i64).min(rows.end) {
             for x in x0..(x0 + size.1 as i64).min(width as i64) {
                 let at = ((y - y0) as usize, (x - x0) as usize);
@@ -123,7 +125,6 @@ impl Mosaic<'_> {
                     [(y * PARTS + oy) as u32, (x * PARTS + ox) as u32];
             }
         }
-        Ok(())
     }
 }
 

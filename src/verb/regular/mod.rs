@@ -178,6 +178,7 @@ impl<'a> RegularMaker<'a> {
             block,
             border,
             lattices: [source, output],
+            sample_candidates: params.sample_candidates,
             candidates: params.candidates,
             // Where everything is allowed there is nothing to be off.
             tolerance: if lattice.is_some() { params.tolerance } else { 0 },

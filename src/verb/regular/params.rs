@@ -116,6 +116,8 @@ params! {
         block: OrAuto<usize> = OrAuto::Auto, unit "px";
         /// How far pieces overlap with their neighbours, to either side; at most half a block.
         border: OrAuto<usize> = OrAuto::Auto, unit "px";
+        /// How many places are tried for each of the pieces that are drawn at random: of these the one that agrees best with the random pieces around it is taken. 1 leaves it to chance, as in the paper; 16 joins stones and panes of many sizes and colours better, and mixes the photo a little less evenly.
+        sample_candidates: usize = 1, in 1..=65536;
         /// How many pieces are tried for every gap between those that were drawn at random.
         candidates: usize = 64, in 1..=65536;
         /// How far from its place on the lattice a piece for a gap may come from.

@@ -1,16 +1,15 @@
-//! Gap filling: the patch whose frame agrees best with what surrounds the gap.
+//! Which patch agrees best with what surrounds it.
 
 use crate::base::ctx::Simd;
 use crate::image::interpolate::{PARTS, nearest as pixel};
 use crate::method::rsgf::Matching;
-use crate::method::rsgf::grid::{Lenses, Side};
 use crate::method::rsgf::places::Offset;
 use crate::search::patch::{Kernel, MatchImage, WithKernel, squares, with_kernel};
 
 /// How many of the places are looked at more closely. More finds a little better ones.
 pub(super) const CLOSER: usize = 8;
 
-/// The overlaps around a gap, row by row, with the codes that its neighbours have there.
+/// The overlaps around a block, row by row, with the codes that its neighbours have there.
 #[derive(Debug, Clone)]
 pub(super) struct Frame {
     /// Row and column in the window where a run of overlapping pixels begins, and its codes.
@@ -19,22 +18,21 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    /// The frame of a gap whose neighbour at a side has `code(side, pixel of the window)`.
+    /// The frame of a window whose pixels a neighbour reaches over where there is a `code`.
     pub(super) fn new(
-        lenses: &Lenses,
-        mut code: impl FnMut(Side, (usize, usize)) -> [u8; 4],
+        (height, width): (usize, usize),
+        mut code: impl FnMut((usize, usize)) -> Option<[u8; 4]>,
     ) -> Self {
-        let (height, width) = lenses.window();
         let mut frame = Self { runs: Vec::new(), codes: Vec::new() };
         for y in 0..height {
             let mut open = false;
             for x in 0..width {
-                let Some((side, _)) = lenses.at((y, x)) else {
+                let Some(code) = code((y, x)) else {
                     open = false;
                     continue;
                 };
                 let at = frame.codes.len();
-                frame.codes.extend(code(side, (y, x)));
+                frame.codes.extend(code);
                 match frame.runs.last_mut() {
                     Some((_, _, run)) if open => run.end = at + 4,
                     _ => frame.runs.push((y, x, at..at + 4)),
@@ -44,29 +42,38 @@ impl Frame {
         }
         frame
     }
+
+    /// The mean of what the windows at these places show in the frame.
+    pub(super) fn mean(&self, source: &MatchImage, places: &[Offset]) -> Self {
+        let mut sums = vec![0u32; self.codes.len()];
+        for place in places {
+            let [top, left] = place.map(|v| pixel(v) as usize);
+            for (y, x, run) in &self.runs {
+                let there = source.codes_from(source.at(top + y, left + x), run.len());
+                for (sum, &code) in sums[run.clone()].iter_mut().zip(there) {
+                    *sum += u32::from(code);
+                }
+            }
+        }
+        let count = places.len().max(1) as u32;
+        let codes = sums.into_iter().map(|sum| ((sum + count / 2) / count) as u8).collect();
+        Self { runs: self.runs.clone(), codes }
+    }
 }
 
-/// The place of the patch whose frame is most like the one around the gap: of `places` the best few,
-/// each moved by at most `tolerance` rows and columns. Places are the window's top left corner in
+/// The place of the patch whose frame is most like the one wanted: of `places` the best few, each moved by at most `tolerance` rows and columns. Places are the window's top left corner in
 /// `source`, compared at the nearest pixel (what is made between pixels is smoother, and noise would agree
 /// with it better); moved ones that do not fit are skipped. Of equally good ones the first. `None` without any
 /// place.
 pub(super) fn nearest(
-    (simd, matching): (Simd, Matching),
+    how: (Simd, Matching),
     source: &MatchImage,
     frame: &Frame,
     places: &[Offset],
     tolerance: usize,
     fits: impl Fn(Offset) -> bool,
 ) -> Option<Offset> {
-    let costs = |places: &[Offset], cut_off: bool| {
-        let places: &[Offset] = &places.iter().map(|place| place.map(pixel)).collect::<Vec<_>>();
-        match matching {
-            Matching::Color => with_kernel(simd, 1, Differences { source, frame, places, cut_off }),
-            Matching::Correlation => with_kernel(simd, 1, Correlations { source, frame, places }),
-        }
-    };
-    let all = costs(places, false);
+    let all = costs(how, source, frame, places, false);
     let mut order: Vec<usize> = (0..places.len()).collect();
     order.sort_by_key(|&i| all[i]);
     let t = tolerance as i64;
@@ -78,8 +85,24 @@ pub(super) fn nearest(
         std::iter::once([y, x]).chain(moved)
     });
     let closer: Vec<Offset> = closer.filter(|&place| fits(place)).collect();
-    let costs = costs(&closer, true);
+    let costs = costs(how, source, frame, &closer, true);
     (0..closer.len()).min_by_key(|&i| costs[i]).map(|i| closer[i])
+}
+
+/// By how much the frames of the patches at `places` differ from the one wanted; with `cut_off`, those
+/// that differ by more than one before them may be given too little, but more than that one.
+pub(super) fn costs(
+    (simd, matching): (Simd, Matching),
+    source: &MatchImage,
+    frame: &Frame,
+    places: &[Offset],
+    cut_off: bool,
+) -> Vec<u64> {
+    let places: &[Offset] = &places.iter().map(|place| place.map(pixel)).collect::<Vec<_>>();
+    match matching {
+        Matching::Color => with_kernel(simd, 1, Differences { source, frame, places, cut_off }),
+        Matching::Correlation => with_kernel(simd, 1, Correlations { source, frame, places }),
+    }
 }
 
 /// The sum of squared differences of colours at every place (paper eq. 10); with `cut_off`, only those
@@ -169,6 +192,7 @@ impl WithKernel for Correlations<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::method::rsgf::grid::Lenses;
     use proptest::prelude::*;
 
     /// A source of noise, and a frame that was copied from it at some place and changed a little.
@@ -183,9 +207,9 @@ mod tests {
             .collect();
         source.fill_rows(|y, row| row.copy_from_slice(&codes[y * 52..][..52]));
         let lenses = Lenses { size: (9, 11), border: 3 };
-        let frame = Frame::new(&lenses, |_, (y, x)| {
+        let frame = Frame::new(lenses.window(), |(y, x)| {
             let [a, b, c, _] = codes[(y + 13) * 52 + x + 17];
-            [a.saturating_sub(3), b.saturating_add(2).min(127), c, 0]
+            lenses.at((y, x)).map(|_| [a.saturating_sub(3), b.saturating_add(2).min(127), c, 0])
         });
         (source, lenses, frame)
     }
